@@ -36,12 +36,17 @@ fn in_ticks() -> Link {
 }
 
 fn on_the_wall() -> Link {
-    started(&x80(), Pace::Rate(1.0), 0)
+    in_time(&x80())
 }
 
-/// Events at machine-clock readings; wall-clock missions begin at 0.
+fn in_time(mission: &Mission) -> Link {
+    started(mission, Pace::Rate(1.0), 0)
+}
+
+/// Events at machine-clock readings, milliseconds; wall-clock missions begin at 0.
 impl Link {
-    fn at(&mut self, event: Event<'_>, machine_ns: u64) -> Vec<Effect> {
+    fn at(&mut self, event: Event<'_>, ms: u64) -> Vec<Effect> {
+        let machine_ns = ms * MS;
         let now = match self.state.pace {
             Pace::Max => self.state.next_tick * PERIOD_NS,
             Pace::Rate(_) => machine_ns,
@@ -50,11 +55,11 @@ impl Link {
     }
 
     fn quiet(&mut self, ms: u64) -> Vec<Effect> {
-        self.at(Event::Quiet, ms * MS)
+        self.at(Event::Quiet, ms)
     }
 
     fn hears(&mut self, bytes: &[u8], ms: u64) -> Vec<Effect> {
-        self.at(Event::Datagram(bytes), ms * MS)
+        self.at(Event::Datagram(bytes), ms)
     }
 
     /// Hears a robot at its start.
@@ -63,21 +68,21 @@ impl Link {
     }
 
     fn drive(&mut self, ms: u64) -> Vec<Effect> {
-        self.at(Event::Order(Order::Drive, HoldReason::None), ms * MS)
+        self.at(Event::Order(Order::Drive, HoldReason::None), ms)
     }
 
     fn hold(&mut self, reason: HoldReason, ms: u64) -> Vec<Effect> {
-        self.at(Event::Order(Order::Hold, reason), ms * MS)
+        self.at(Event::Order(Order::Hold, reason), ms)
     }
 
     /// Takes a command, 1 ms after its tick of `ms`.
     fn told(&mut self, tick: u64, ms: u64, speeds: [f64; 2]) -> Vec<Effect> {
-        self.at(Event::Command(command(tick, ms * MS, speeds)), (ms + 1) * MS)
+        self.at(Event::Command(command(tick, ms * MS, speeds)), ms + 1)
     }
 
     /// Answers a tick of lockstep.
-    fn answer(&mut self, tick: u64, machine_ns: u64) -> Vec<Effect> {
-        self.at(Event::Command(command(tick, tick * PERIOD_NS, [TURN; 2])), machine_ns)
+    fn answer(&mut self, tick: u64, ms: u64) -> Vec<Effect> {
+        self.at(Event::Command(command(tick, tick * PERIOD_NS, [TURN; 2])), ms)
     }
 }
 
@@ -214,9 +219,9 @@ fn a_link_pings_until_the_robot_answers_sets_it_up_and_tells_it_to_stand_until_a
 fn a_wire_that_goes_down_is_a_robot_lost_and_nothing_is_sent_until_it_is_back() {
     let mut link = driving(on_the_wall());
     link.hears(&datagram(80, [0; 2])[..20], 10);
-    assert!(link.at(Event::Wire(false), 11 * MS).contains(&LOST));
+    assert!(link.at(Event::Wire(false), 11).contains(&LOST));
     assert_eq!(link.quiet(1000), []);
-    let effects = link.at(Event::Wire(true), 1001 * MS);
+    let effects = link.at(Event::Wire(true), 1001);
     assert_eq!(sent(&effects)[0], PING);
     assert_eq!(velocities(&effects), [STAND; STOPS as usize]);
     let effects = link.hears(&datagram(80, [0; 2]), 1002);
@@ -288,7 +293,7 @@ fn a_command_that_no_longer_holds_or_whose_successor_is_due_is_not_sent_again() 
     ] {
         let mut link = ticking();
         link.told(0, 10, [1.0; 2]);
-        link.at(event, at * MS);
+        link.at(event, at);
         assert!(stands(&link.quiet(at + 70)), "{event:?}");
     }
 }
@@ -312,12 +317,12 @@ fn a_link_that_stops_its_robot_looks_again_soon() {
 #[test]
 fn a_command_that_is_older_than_the_newest_or_from_the_future_moves_nothing() {
     let future = Event::Command(command(0, 900 * MS, [1.0; 2]));
-    assert!(stands(&ticking().at(future, 11 * MS)));
+    assert!(stands(&ticking().at(future, 11)));
     let mut link = ticking();
     assert_eq!(ticks(&link.still(150))[0].0, 1, "after an abandoned tick");
     link.told(1, 150, [1.0; 2]);
     let old = Event::Command(command(0, 10 * MS, [-1.0; 2]));
-    assert_eq!(link.at(old, 152 * MS), []);
+    assert_eq!(link.at(old, 152), []);
 }
 
 #[test]

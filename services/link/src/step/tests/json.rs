@@ -3,7 +3,7 @@
 use super::*;
 
 fn link() -> Link {
-    let mut link = started(&mission("robot.model = 'kobuki'"), Pace::Rate(1.0), 0);
+    let mut link = in_time(&mission("robot.model = 'kobuki'"));
     link.drive(0);
     link
 }
@@ -39,6 +39,6 @@ fn a_robot_whose_program_restarts_while_it_drives_is_greeted_again_before_it_is_
 
 #[test]
 fn a_link_that_ends_tells_its_robot_to_stand() {
-    let last = velocities(&driving(on_the_wall()).at(Event::End, MS));
+    let last = velocities(&driving(on_the_wall()).at(Event::End, 1));
     assert_eq!(last, [STAND; STOPS as usize]);
 }

@@ -44,7 +44,7 @@ impl Scene {
     /// Drives straight ahead at 0.15 m/s.
     fn driving() -> Self {
         let mut scene = Self {
-            link: started(&burger(), Pace::Rate(1.0), 0),
+            link: in_time(&burger()),
             topics: Topics::of(&burger()),
             ms: 0,
             pose: [0.0; 3],
@@ -72,7 +72,7 @@ impl Scene {
     }
 
     fn event(&mut self, event: Event<'_>) {
-        let effects = self.link.at(event, self.ms * MS);
+        let effects = self.link.at(event, self.ms);
         for effect in &effects {
             match effect {
                 Effect::Send(bytes) if !bytes.is_empty() => {

@@ -34,18 +34,18 @@ impl Driver for Laser {
 
 #[test]
 fn a_sensor_with_a_wire_of_its_own_is_greeted_heard_at_the_next_tick_and_no_sign_of_the_robot() {
-    let mut link = started(&mission("robot.model = 'kobuki'"), Pace::Rate(1.0), 0);
+    let mut link = in_time(&mission("robot.model = 'kobuki'"));
     link.drivers.push(Box::new(Laser));
     let greeted = link.at(Event::SensorWire(0, true), 0);
     assert!(greeted.contains(&Effect::SendSensor(0, b"scan".to_vec())), "{greeted:?}");
-    link.at(Event::Sensor(0, &[1]), MS);
+    link.at(Event::Sensor(0, &[1]), 1);
     assert!(!link.connected());
     let wheels = b"{\"wheels\":[0,0],\"speeds\":[0,0]}\n";
     link.hears(wheels, 10);
     link.drive(11);
-    link.at(Event::Sensor(0, &[2]), 50 * MS);
+    link.at(Event::Sensor(0, &[2]), 50);
     // No such sensor.
-    link.at(Event::Sensor(7, &[3]), 60 * MS);
+    link.at(Event::Sensor(7, &[3]), 60);
     let effects = link.hears(wheels, 110);
     let scans = effects.iter().filter_map(|effect| match effect {
         Effect::Tick { ranges, scans, .. } => Some((ranges[0].range_m, scans.clone())),
@@ -55,7 +55,7 @@ fn a_sensor_with_a_wire_of_its_own_is_greeted_heard_at_the_next_tick_and_no_sign
         panic!("{effects:?}");
     };
     assert_eq!((scans[0].beams[0], scans[0].sweep.first_beam_ns), (2.0, -60_000_000));
-    let refused = link.at(Event::Sensor(0, &[0]), 120 * MS);
+    let refused = link.at(Event::Sensor(0, &[0]), 120);
     assert!(refused.contains(&Effect::Refused("no scan".into())));
     // The laser falls silent.
     let mut again = (3..30).flat_map(|tick| link.hears(wheels, 50 * tick));
