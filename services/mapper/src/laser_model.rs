@@ -373,11 +373,9 @@ mod tests {
 
     #[test]
     fn a_wall_keeps_its_edge_while_the_laser_looks_along_it_and_a_trail_fades() {
-        let far_first = (0..20).rev().flat_map(|cell| vec![vec![1.0 + 0.05 * cell as f32]; 3]);
-        let seen: Vec<_> = far_first.collect();
         let along = |scans: usize| {
-            let scans: Vec<_> = seen.iter().cloned().chain(vec![vec![2.3]; scans]).collect();
-            after(&scans)
+            let far_first = (0..20).rev().flat_map(|cell| vec![vec![1.0 + 0.05 * cell as f32]; 3]);
+            after(&Vec::from_iter(far_first.chain(vec![vec![2.3]; scans])))
         };
         assert!(along(5).is_occupied(ahead(1.0)));
         assert!(!along(5).is_occupied(ahead(1.95)), "nothing goes on behind it");
@@ -388,11 +386,11 @@ mod tests {
     fn two_neighbours_that_end_before_noise_explains_it_are_a_thing_among_many_that_pass() {
         let beams = |near: usize| {
             let beam = |number: usize| if (5..5 + near).contains(&number) { 0.3 } else { 1.5 };
-            vec![(0..14).map(beam).collect::<Vec<f32>>()]
+            (0..14).map(beam).collect()
         };
         let place = 0.3 * DVec2::from_angle(5.5_f64.to_radians());
         let place = LATTICE.index(LATTICE.cell_at(place).unwrap());
-        assert!(!after(&beams(1)).is_occupied(place) && after(&beams(2)).is_occupied(place));
+        assert!(!after(&[beams(1)]).is_occupied(place) && after(&[beams(2)]).is_occupied(place));
     }
 
     #[test]
@@ -414,7 +412,7 @@ mod tests {
             let post = sin.atan2(cos).abs() < 0.05;
             if post { 1.0 } else { wall as f32 }
         };
-        let beams: Vec<f32> = (0..1440).map(beam).collect();
+        let beams = Vec::from_iter((0..1440).map(beam));
         let fan = fan(DVec2::new(0.013, -0.021), 0.25, &beams);
         let mut scan = Scan::new(&LATTICE, &fan).unwrap();
         scan.pass(5.0, PASSED);
@@ -426,7 +424,7 @@ mod tests {
             }
         }
         let marked = |index: &usize| scan.marks[*index] != 0;
-        let marked: Vec<usize> = (0..passed.len()).filter(marked).collect();
+        let marked = Vec::from_iter((0..passed.len()).filter(marked));
         assert!(marked.iter().all(|index| passed[*index]), "what no beam passed is not free");
         let all = passed.iter().filter(|passed| **passed).count();
         assert!(marked.len() > all * 9 / 10, "{} of {all}", marked.len());

@@ -498,7 +498,7 @@ mod tests {
     fn a_robot_that_sees_nothing_known_goes_on_by_its_wheels_and_says_so() {
         let room = scan(START, ROOM);
         let held = &mut started(&room);
-        let hall: Vec<_> = room.iter().map(|range| 2.5 * range).collect();
+        let hall = Vec::from_iter(room.iter().map(|range| 2.5 * range));
         let there = Pose2 { position: dvec2(0.2, 0.0), heading: 0.1 };
         assert_eq!(matched(held, there, &hall), None);
         let fix = matched(held, there, &hall).unwrap();

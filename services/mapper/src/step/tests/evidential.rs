@@ -6,7 +6,7 @@ use common::wire::{infrared_ad, infrared_m};
 /// Delta = 0.1 m, the origin in cell (25, 25). The sensor is 0.2 m ahead, the body's radius 0.19 m.
 fn mapper(extra: &str) -> Mapper {
     mapper_of(&format!(
-        "target = [2, 0]\nperimeter = {{ width_m = 5, cells = 50 }}\nsonar = {{ forward_m = 0.2 }}\n{extra}\n[mapper]\nmap_within_m = 1.0\n"
+        "target = [2, 0]\nperimeter = {{ width_m = 5, cells = 50 }}\nsonar.forward_m = 0.2\nmapper.map_within_m = 1.0\n{extra}"
     ))
 }
 
@@ -231,7 +231,7 @@ fn a_reading_that_no_sensor_can_give_is_ignored() {
     let mut mapper = mapper("");
     let wrong = [(200, 0.5), (0, f64::NAN), (4, f64::NAN), (5, -1.0)];
     let readings = wrong.map(|(sensor, range_m)| RangeReading { sensor, ..echo(range_m) });
-    mapper.sense(PoseSample::default(), &readings);
+    mapper.sense(start(), &readings);
     assert_eq!(mapper.state().safety_events, 0);
 }
 
@@ -242,9 +242,7 @@ fn evidence_that_nothing_renews_is_weaker_with_time_and_gone_when_it_should_be()
         mapper.sense(PoseSample { stamp, ..start() }, heard.map(echo).as_slice());
     };
     let gone_after = |set: &str, echoes: u64| {
-        let mut mapper = mapper_of(&format!(
-            "target = [2, 0]\nperimeter = {{ width_m = 5, cells = 50 }}\nsonar.forward_m = 0.2\n[mapper]\nmap_within_m = 1.0\n{set}"
-        ));
+        let mut mapper = mapper(set);
         (0..echoes).for_each(|second| hear(&mut mapper, second, Some(0.7)));
         assert!(mapper.hazard_ahead(90) && mapper.ahead(50) == Scanned);
         let gone = (echoes..400).find(|second| {
@@ -253,7 +251,7 @@ fn evidence_that_nothing_renews_is_weaker_with_time_and_gone_when_it_should_be()
         });
         (gone, mapper.ahead(50))
     };
-    let forgets = "forget_after_s = 120";
+    let forgets = "mapper.forget_after_s = 120";
     // Three echoes reach the maximum weight, one a third of it.
     assert_eq!(gone_after(forgets, 3), (Some(120), Free));
     assert_eq!(gone_after(forgets, 1), (Some(40), Scanned));

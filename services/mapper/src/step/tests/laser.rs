@@ -13,52 +13,54 @@ fn mapper() -> Mapper {
     mapper_of(text)
 }
 
-/// Maps a wall at `wall` metres by laser, and an echo, at the origin facing along x.
-fn sense(mapper: &mut Mapper, ticks: usize, wall: f64, echo: f64) {
-    let beam = |degrees: u32| {
-        let ahead = (f64::from(degrees) - 180.0).to_radians().cos();
-        if ahead > 0.1 { (wall / ahead) as f32 } else { f32::INFINITY }
-    };
-    for _ in 0..ticks {
-        let ranges = vec![RangeReading { sensor: 1, ..super::echo(echo) }];
-        let scans = vec![Scan { beams: (0..360).map(beam).collect(), ..Scan::default() }];
-        mapper.give(Tick { ranges, scans, ..Tick::default() });
+impl Mapper {
+    /// Maps a wall at `wall` metres by laser, and an echo, at the origin facing along x.
+    fn sense_wall(&mut self, ticks: usize, wall: f64, echo: f64) {
+        let beam = |degrees: u32| {
+            let ahead = (f64::from(degrees) - 180.0).to_radians().cos();
+            if ahead > 0.1 { (wall / ahead) as f32 } else { f32::INFINITY }
+        };
+        for _ in 0..ticks {
+            let ranges = vec![RangeReading { sensor: 1, ..super::echo(echo) }];
+            let scans = vec![Scan { beams: (0..360).map(beam).collect(), ..Scan::default() }];
+            self.give(Tick { ranges, scans, ..Tick::default() });
+        }
     }
 }
 
 #[test]
 fn a_thing_that_the_laser_looks_over_is_hazard_while_the_sonar_hears_it_and_after_a_restart() {
     let mut mapper = mapper();
-    sense(&mut mapper, 20, 2.0, 0.4);
+    mapper.sense_wall(20, 2.0, 0.4);
     assert!(mapper.hazard_ahead(60));
     let mut restarted = self::mapper();
     restarted.restore(mapper.state().clone()).unwrap();
     for mapper in [&mut mapper, &mut restarted] {
-        sense(mapper, 1, 2.0, 0.4);
+        mapper.sense_wall(1, 2.0, 0.4);
     }
     assert_eq!(mapper.state(), restarted.state());
-    sense(&mut mapper, 19, 2.0, 1.8);
+    mapper.sense_wall(19, 2.0, 1.8);
     assert!(!mapper.hazard_ahead(60), "the sonar hears that it is gone");
 }
 
 #[test]
 fn an_echo_of_what_the_laser_sees_marks_nothing_beside_it() {
     let mut mapper = mapper();
-    sense(&mut mapper, 1, 1.0, 0.8);
+    mapper.sense_wall(1, 1.0, 0.8);
     let by_scan = mapper.hazards();
     for echo in [0.79, 0.8, 0.81, 0.82] {
-        sense(&mut mapper, 1, 1.0, echo);
+        mapper.sense_wall(1, 1.0, echo);
     }
     assert_eq!(mapper.hazards(), by_scan);
-    sense(&mut mapper, 1, 1.0, 0.5);
+    mapper.sense_wall(1, 1.0, 0.5);
     assert!(mapper.hazards().len() > by_scan.len(), "another echo does");
 }
 
 #[test]
 fn a_pane_of_glass_stays_though_the_laser_looks_through_it_at_a_slant() {
     let mut mapper = mapper();
-    sense(&mut mapper, 5, 0.7, 0.5);
-    sense(&mut mapper, 10, 2.0, 0.5);
+    mapper.sense_wall(5, 0.7, 0.5);
+    mapper.sense_wall(10, 2.0, 0.5);
     assert!(mapper.hazard_ahead(60));
 }
 
