@@ -113,7 +113,7 @@ mod tests {
             let top = speeds.body.top_rad_s();
             let told = speeds.of(&turning(0.8 * top, top), 1.25, &WheelSample::default());
             let [left, right] = told.map(f64::from);
-            assert!((left / right - ratio).abs() < 0.01, "{protocol}: {left} {right}");
+            near(left / right, ratio, 0.01);
             let no_number = speeds.of(&turning(f64::NAN, 0.0), 1.0, &WheelSample::default());
             assert_eq!(no_number, [0; 2], "{protocol}");
         }
@@ -142,8 +142,8 @@ mod tests {
             speeds.told(counts);
             let [left, right] = counts.map(|count| f64::from(count) / speeds.counts_per_radian());
             let is = [(right + left) * r / 2.0, (right - left) * r / w];
-            let are_near = (is[0] - reached_v).abs() < 1e-3 && (is[1] - reached_omega).abs() < 5e-3;
-            assert!(are_near, "{v} {omega}: {is:?}");
+            near(is[0], reached_v, 1e-3);
+            near(is[1], reached_omega, 5e-3);
             let stands = [reached_v, reached_omega] == [0.0; 2];
             assert!(!stands || counts == [0, 0], "{v} {omega}: {counts:?}");
         }

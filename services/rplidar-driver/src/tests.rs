@@ -110,8 +110,7 @@ fn after_garbage_a_cut_off_measurement_or_a_restart_the_next_whole_turn_is_heard
 fn a_turn_comes_in_any_pieces_and_nothing_is_heard_before_it_begins() {
     let mut driver = scanning("");
     let bytes = [turn(|_| 1.0)[25..].to_vec(), turn(|_| 2.0), next()].concat();
-    let heard = bytes.iter().flat_map(|byte| driver.hear(&[*byte]).scans);
-    let scans: Vec<_> = heard.collect();
+    let scans = Vec::from_iter(bytes.iter().flat_map(|byte| driver.hear(&[*byte]).scans));
     assert_eq!((scans.len(), at(&scans[0], 90)), (1, 2.0));
     driver.reset();
     assert!(hears(&mut driver, 1.0).is_empty(), "the next connection must be greeted");

@@ -234,12 +234,11 @@ mod tests {
             by_wheels.robot_is(pose, at(at_s));
             let late = if during.contains(&tick) { late } else { 0 };
             let then = poses[poses.len().saturating_sub(1 + late)];
-            let readings: Vec<_> = (0..)
+            let readings = (0..)
                 .zip(&table)
                 .filter(|(sensor, _)| rows.contains(sensor))
-                .filter_map(|(sensor, it)| Some(reading(sensor, Some(range(it, then)?))))
-                .collect();
-            motion.take(&readings, &by_wheels, at_s);
+                .filter_map(|(sensor, it)| Some(reading(sensor, Some(range(it, then)?))));
+            motion.take(&Vec::from_iter(readings), &by_wheels, at_s);
         }
         motion
     }

@@ -154,8 +154,6 @@ mod tests {
     use crate::testing::mission;
     use Counts::{Elsewhere, Follow, Implausible};
 
-    const RESTARTED: Counts = Counts::Restarted { was_away: false };
-
     impl RestartWatch {
         fn at(&mut self, ms: u64, counts: [u16; 2]) -> Counts {
             self.step(counts, [0; 2], false, at(ms))
@@ -177,7 +175,8 @@ mod tests {
         watch.at(0, [300, 300]);
         assert_eq!(watch.at(143, [2, 1]), Follow);
         watch.at(500, [800, 900]);
-        assert_eq!(watch.at(643, [0, 0]), RESTARTED, "nothing turns so fast");
+        // Nothing turns so fast.
+        assert_eq!(watch.at(643, [0, 0]), Counts::Restarted { was_away: false });
     }
 
     #[test]

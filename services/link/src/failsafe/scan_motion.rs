@@ -179,7 +179,7 @@ mod tests {
                 let bearing = laser.heading + first_rad + beam as f64 * step_rad;
                 (noise * range(laser.position, bearing)) as f32
             };
-            scans.push((0..sensor.beams).map(beam).collect::<Vec<_>>());
+            scans.push(Vec::from_iter((0..sensor.beams).map(beam)));
             let at_s = tick as f64 * 0.1;
             poses.robot_is(pose, at(at_s));
             let beams = scans[seen(tick)].clone();

@@ -125,7 +125,7 @@ const fn commander(moves: bool) -> Observation<'static> {
 
 /// Omits infrared-1, which looks into the front sonar's cone.
 fn without_an_infrared_ranger(failsafe: &mut Failsafe) {
-    let readings: Vec<_> = [0, 1, 2, 3, 5, 6, 7, 8, 9].map(|sensor| reading(sensor, None)).into();
+    let readings = [0, 1, 2, 3, 5, 6, 7, 8, 9].map(|sensor| reading(sensor, None));
     failsafe.monitors.streams = Monitor::new(&mission(""));
     failsafe.sees(FOUND, 0);
     failsafe.sees(Readings(&readings), 0);

@@ -377,8 +377,7 @@ mod tests {
                     rolled[wheel] += speeds[wheel] * step_s;
                 }
             }
-            let WheelRatio { ratio, deviation } = shares.ratio();
-            assert!((ratio - 1.0).abs() < 0.018, "{ratio} +- {deviation} in tick {tick}");
+            near(shares.ratio().ratio, 1.0, 0.018);
         }
         shares.sums.way_m
     }
@@ -388,7 +387,6 @@ mod tests {
         let turns = |tick: usize| [[600, 600], [300, 700], [700, 600], [700, 250]][tick / 9 % 4];
         // Stated acceleration, but less speed.
         let found = ratio("robot.response.acceleration_m_s2 = 0.3", [0.78; 2], turns);
-        let WheelRatio { ratio, deviation } = found;
-        assert!((ratio - 1.0).abs() < 0.01 + 3.0 * deviation, "{ratio} +- {deviation}");
+        near(found.ratio, 1.0, 0.01 + 3.0 * found.deviation);
     }
 }

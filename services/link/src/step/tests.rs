@@ -184,10 +184,6 @@ fn decided(effects: &[Effect]) -> Vec<(Action, Cause)> {
     effects.iter().filter_map(decision).collect()
 }
 
-fn causes(effects: &[Effect]) -> impl Iterator<Item = Cause> {
-    decided(effects).into_iter().map(|(_, cause)| cause)
-}
-
 fn ticks(effects: &[Effect]) -> Vec<(u64, Vec<RangeReading>, WheelSample)> {
     let tick = |effect: &Effect| match effect {
         Effect::Tick { tick, ranges, wheels, .. } => Some((*tick, ranges.clone(), *wheels)),
@@ -232,7 +228,7 @@ fn a_wire_that_goes_down_is_a_robot_lost_and_nothing_is_sent_until_it_is_back() 
 fn a_robot_that_stays_away_is_pinged_ever_less_often_and_heard_at_once() {
     let mut link = on_the_wall();
     let is_pinged = |now: &u64| sent(&link.quiet(*now)).contains(&PING);
-    let pings: Vec<_> = (0..8000).step_by(20).filter(is_pinged).collect();
+    let pings = Vec::from_iter((0..8000).step_by(20).filter(is_pinged));
     assert_eq!(pings, [0, 200, 600, 1400, 3000, 5000, 7000]);
     let expected = Absence { lost_ns: 7900 * MS, pings: 7, next_ping_ns: 1100 * MS };
     assert_eq!(link.absence(7900 * MS), expected);

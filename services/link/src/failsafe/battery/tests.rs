@@ -1,10 +1,9 @@
 use super::*;
 use crate::testing::*;
 
-const LIMITS: BatteryLimits = BatteryLimits { board: 6.6, motor: 11.0, servo: 0.0 };
-
 fn batteries() -> Batteries {
-    Batteries { limits: LIMITS, ..Batteries::new(&mission("")) }
+    let limits = BatteryLimits { board: 6.6, motor: 11.0, servo: 0.0 };
+    Batteries { limits, ..Batteries::new(&mission("")) }
 }
 
 impl Batteries {

@@ -5,7 +5,6 @@ use common::mission::ModelledSpeed;
 use super::*;
 use crate::testing::*;
 
-const PERIOD_S: f64 = 0.1;
 const SEEDS: u64 = 2;
 const COUNTS_PER_M: f64 = 7162.0;
 const MISSION: &str = "[robot]
@@ -52,7 +51,7 @@ fn drive(base: Base, seed: u64, dies_s: f64) -> Option<(f64, bool)> {
     let (mut rolled, mut command, mut changes_s) = ([0.0; 2], [0.0; 2], 0.0);
     let (mut last, mut found) = (None, 0);
     for tick in 1..400 {
-        let now = f64::from(tick) * PERIOD_S + 0.04 * random();
+        let now = f64::from(tick) * 0.1 + 0.04 * random();
         let [one, other] = limited.each_mut().map(|speed| speed.go_on(now));
         let [left, right] = if turn.is_some() { [one - other, one + other] } else { [one, other] };
         rolled[1] += right;

@@ -64,7 +64,7 @@ impl Scene {
     fn answer(&mut self, said: &str) {
         for request in said.split_terminator('\r') {
             let turned = self.turned;
-            let words: Vec<_> = request.split(' ').collect();
+            let words = Vec::from_iter(request.split(' '));
             let answer = match words[..] {
                 ["e"] => format!("{turned} {turned}\r\n"),
                 // Changes as the robot drives.
@@ -89,7 +89,7 @@ impl Scene {
                 self.event(Event::Order(Order::Drive, HoldReason::None));
             }
             let ms = self.ms;
-            let due: Vec<_> = self.answers.extract_if(.., |answer| answer.0 <= ms).collect();
+            let due = Vec::from_iter(self.answers.extract_if(.., |answer| answer.0 <= ms));
             for (_, answer) in due {
                 let ticks = self.ticks.len();
                 self.event(Event::Datagram(answer.as_bytes()));
@@ -143,7 +143,7 @@ fn a_closed_wire_is_not_polled_and_an_open_one_is_asked_for_its_baud_rate_first(
     assert!(scene.rounds().is_empty());
     scene.event(Event::Wire(true));
     scene.run(200);
-    let asked: Vec<_> = scene.sent.iter().filter(|(_, said)| !said.starts_with('m')).collect();
+    let asked = Vec::from_iter(scene.sent.iter().filter(|(_, said)| !said.starts_with('m')));
     assert_eq!((&*asked[0].1, &*asked[1].1), ("\rb\r", ROUND), "{asked:?}");
 }
 
@@ -164,7 +164,7 @@ fn in_lockstep_each_command_and_ping_is_followed_by_one_poll_and_one_tick() {
     scene.run(300);
     let commands = scene.sent.iter().filter(|(_, said)| said.starts_with('m')).count();
     assert!(commands >= 20, "{:?}", scene.sent);
-    assert_eq!(scene.ticks, (0..scene.ticks.len() as u64).collect::<Vec<_>>());
+    assert_eq!(scene.ticks, Vec::from_iter(0..scene.ticks.len() as u64));
     assert!(scene.rounds().len().abs_diff(scene.ticks.len()) <= 1, "{:?}", scene.sent);
     assert_eq!(scene.link.tally.repeated_ticks, 0);
 }

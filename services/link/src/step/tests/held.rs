@@ -2,8 +2,6 @@
 
 use super::*;
 
-const AHEAD: [[Option<i16>; 2]; 1] = [[Some(-1200), Some(1200)]];
-
 const fn limit(last_tick: u64) -> Event<'static> {
     Event::TickLimit { last_tick, target_number: 1 }
 }
@@ -25,7 +23,7 @@ fn in_lockstep_a_hold_lets_no_command_pass_and_the_run_goes_on_where_it_was() {
     assert_eq!(sent(&effects), [], "each command would be a tick");
     assert_eq!(sent(&link.drive(2002)), []);
     assert_eq!(ticks(&link.quiet(2101))[0].0, 1, "the same tick again");
-    assert_eq!(velocities(&link.answer(1, 2102)), AHEAD);
+    assert_eq!(velocities(&link.answer(1, 2102)), [[Some(-1200), Some(1200)]]);
 }
 
 #[test]

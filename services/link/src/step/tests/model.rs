@@ -325,7 +325,7 @@ impl World {
         let moment = Moment { time: MissionTime(self.now_ns), machine_ns: self.now_ns };
         let (link, supervisor) = (&self.link, &self.supervisor);
         let all = &link.failsafe.monitors;
-        let applied: Vec<_> = TABLE.iter().map(|row| link.failsafe.applied(row.cause)).collect();
+        let applied = Vec::from_iter(TABLE.iter().map(|row| link.failsafe.applied(row.cause)));
         let does_not_stop = all.stop.condition(Cause::RobotDoesNotStop, moment);
         let presence = (all.presence.connected, all.presence.is_silent(self.now_ns));
         // The last send's time matters only for late acknowledgements.

@@ -90,7 +90,7 @@ fn a_robot_that_was_lost_and_acknowledges_what_was_sent_long_ago_is_not_driven()
     for number in 14..40 {
         let late = if number < 28 { ack() } else { Vec::new() };
         let effects = tick(&mut link, number, &[rolled(0), late].concat(), [TURN; 2]);
-        found.extend(causes(&effects));
+        found.extend(decided(&effects).into_iter().map(|(_, cause)| cause));
         if !stands(&effects) {
             moving.get_or_insert(number);
         }

@@ -51,7 +51,7 @@ fn a_sensor_with_a_wire_of_its_own_is_greeted_heard_at_the_next_tick_and_no_sign
         Effect::Tick { ranges, scans, .. } => Some((ranges[0].range_m, scans.clone())),
         _ => None,
     });
-    let [(2.0, scans)] = &scans.collect::<Vec<_>>()[..] else {
+    let [(2.0, scans)] = &Vec::from_iter(scans)[..] else {
         panic!("{effects:?}");
     };
     assert_eq!((scans[0].beams[0], scans[0].sweep.first_beam_ns), (2.0, -60_000_000));
