@@ -39,12 +39,10 @@ mod tests {
     /// bearings in degrees, free lengths in metres.
     fn clear(readings: &[(f64, f64)], radius: f64, x: f64) -> f64 {
         let pose = Pose2 { position: DVec2::new(x, 0.0), heading: 0.0 };
-        let beams: Vec<_> = readings
-            .iter()
-            .map(|&(deg, clear_m)| {
-                beam(0.19 * DVec2::from_angle(f64::to_radians(deg)), deg, clear_m)
-            })
-            .collect();
+        let beam = |&(deg, clear_m): &(f64, f64)| {
+            beam(0.19 * DVec2::from_angle(deg.to_radians()), deg, clear_m)
+        };
+        let beams = Vec::from_iter(readings.iter().map(beam));
         clear_ahead_m(&belief(&beams, &[]), &pose, radius, 1)
     }
 

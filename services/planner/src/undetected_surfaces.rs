@@ -242,7 +242,7 @@ mod tests {
         assert_eq!(undetected(&[], &[]).len(), 11);
         assert_eq!(undetected(&[ahead(0.0, 0.0, 2.0)], &[]), [-75, -60, -45, -30, 30, 45, 60, 75]);
         assert_eq!(undetected(&[ahead(0.0, 45.0, 2.0)], &[]), [-75, -60, -45, -30, -15, 0, 15, 75]);
-        let scan: Vec<_> = (-4..=4).map(|step| ahead(-0.3, f64::from(step) * 16.0, 2.0)).collect();
+        let scan = Vec::from_iter((-4..=4).map(|step| ahead(-0.3, f64::from(step) * 16.0, 2.0)));
         assert_eq!(undetected(&scan, &[]), [0; 0]);
         assert_eq!(undetected(&[], &ring(0.25, 0.7)), [0; 0]);
     }
@@ -278,13 +278,11 @@ mod tests {
     #[test]
     fn a_surface_is_decided_early_only_where_the_rest_of_the_readings_could_not_change_it() {
         // Readings all around, about as long as the distances of the surfaces.
-        let beams: Vec<_> = (0..120_i16)
-            .map(|n| {
-                let n = f64::from(n);
-                ahead(0.3 * (n * 0.7).sin(), n * 137.5 % 360.0, 0.15 + 0.2 * (n * 1.3).sin())
-            })
-            .collect();
-        let belief = belief(&beams, &[]);
+        let beam = |n: i16| {
+            let n = f64::from(n);
+            ahead(0.3 * (n * 0.7).sin(), n * 137.5 % 360.0, 0.15 + 0.2 * (n * 1.3).sin())
+        };
+        let belief = belief(&Vec::from_iter((0..120).map(beam)), &[]);
         // With surfaces at any distance, every reading may have an echo and takes part.
         let [near, far] = [0.6, f64::INFINITY]
             .map(|ahead_m| UndetectedSurfaces::new(&belief, BODY_M, DVec2::ZERO, ahead_m));
@@ -292,8 +290,8 @@ mod tests {
         for n in 0..60 {
             let along = DVec2::from_angle(f64::from(n));
             let at = 0.01 * f64::from(n) * along;
-            let found: Vec<_> = near.normals(at, along).collect();
-            assert_eq!(found, far.normals(at, along).collect::<Vec<_>>(), "{at}");
+            let found = Vec::from_iter(near.normals(at, along));
+            assert_eq!(found, Vec::from_iter(far.normals(at, along)), "{at}");
             excluded += NORMALS - found.len();
         }
         assert!((60..60 * NORMALS - 60).contains(&excluded), "{excluded}");

@@ -217,15 +217,11 @@ fn a_controller_goes_by_the_response_that_the_link_found_as_if_it_were_stated() 
     assert_eq!(told.law, before);
 }
 
-fn jackal() -> Controller {
-    Controller::new(&mission("robot.model = 'jackal'"))
-}
-
 #[test]
 fn a_robot_that_is_to_back_does_so_along_its_axis_and_no_faster_than_the_mission_allows() {
     for (speed_limit_m_s, v) in [(0.1, -0.1), (f64::INFINITY, -2.0), (0.0, 0.0)] {
         let back = GuidanceSample { speed_limit_m_s, ..told(Maneuver::Back) };
-        let command = jackal().at(facing(0.3), &back);
+        let command = Controller::new(&mission("robot.model = 'jackal'")).at(facing(0.3), &back);
         assert_eq!((command.v_m_s, command.omega_rad_s), (v, 0.0));
     }
 }

@@ -272,7 +272,7 @@ fn fixes_that_agree_for_three_seconds_relocate_a_robot_that_was_carried() {
         let relocated = |(tick, (reckoned, error)): (usize, (Reckoned, f64))| {
             reckoned.relocated.then_some((tick / 10, error))
         };
-        all.filter_map(relocated).collect::<Vec<_>>()
+        Vec::from_iter(all.filter_map(relocated))
     };
     for relocated in [relocations(Robot::fix), relocations(Robot::headed_fix)] {
         let [(3, error)] = relocated[..] else { panic!("{relocated:?}") };
@@ -498,7 +498,7 @@ fn a_state_that_is_restored_between_fixes_goes_on_to_the_bit_and_fits_its_file()
     let mut longest = 0;
     for tick in 0..300u64 {
         let wheels = robot.wind();
-        let fixes: Vec<_> = (0..4).map(|_| robot.fix()).collect();
+        let fixes = [(); 4].map(|()| robot.fix());
         let poses = [&mut whole, &mut killed].map(|one| one.given(&wheels, &fixes, &[]).pose);
         assert_eq!(poses[0], poses[1]);
         if tick % 7 == 0 {

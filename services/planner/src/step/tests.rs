@@ -123,7 +123,7 @@ pub(crate) fn in_scanned_room(
 ) -> Planner {
     let (header, cells) = keyframe(mission, hazard, scanned);
     let look = |step: i32| beam(DVec2::ZERO, f64::from(step) * 15.0, 2.0);
-    let mut beams: Vec<_> = (-5..=5).map(look).collect();
+    let mut beams = Vec::from_iter((-5..=5).map(look));
     beams.swap(0, 5);
     let header = GridHeader { part: header.part, ..belief(&beams, &[]) };
     let mut planner = sent(mission);
@@ -147,10 +147,13 @@ fn solve(job: &Job) -> Solved {
 }
 
 #[test]
-fn before_the_first_keyframe_there_is_no_guidance() {
+fn before_the_first_keyframe_there_is_no_guidance_and_a_missing_version_waits_for_it() {
     let mut planner = sent(&mission());
     assert_eq!(planner.status_at_start(), Waiting);
     assert!(planner.snapshot().is_none());
+    let part = Part { keyframe: 0, width: 1, height: 1, ..Part::whole(mission().grid_frame(), 5) };
+    let header = GridHeader { part, ..GridHeader::default() };
+    assert_eq!(planner.take_grid(&header, &[1]).unwrap(), Work::Missed);
 }
 
 #[test]
@@ -373,13 +376,6 @@ fn a_robot_cut_off_on_a_large_map_hears_so_only_from_a_field_of_the_newest_map()
 }
 
 #[test]
-fn a_missing_version_waits_for_a_keyframe() {
-    let part = Part { keyframe: 0, width: 1, height: 1, ..Part::whole(mission().grid_frame(), 5) };
-    let header = GridHeader { part, ..GridHeader::default() };
-    assert_eq!(sent(&mission()).take_grid(&header, &[1]).unwrap(), Work::Missed);
-}
-
-#[test]
 fn the_policy_covers_every_cell_with_unit_vectors_or_nothing() {
     let planner = in_room(&mission(), |at| at.distance(dvec2(0.7, 0.3)) < 0.3);
     let snapshot = planner.snapshot().unwrap();
@@ -420,7 +416,6 @@ fn a_target_in_hazard_or_outside_ends_no_planner() {
 #[test]
 fn on_a_large_map_the_robot_waits_until_the_field_leads_to_its_new_target() {
     let mut room = large_room();
-    assert_eq!(room.status_at_start(), Along);
     room.block_post(-1.0, -1.0);
     let before = room.begin_job().unwrap();
     assert_eq!(room.send(2, -1.5, 0.0), Work::Stale);
@@ -459,13 +454,9 @@ fn the_field_leads_past_a_bend_that_the_body_refused_until_the_map_is_reset() {
 const KOBUKI: &str = "robot.model = 'kobuki'";
 const JACKAL: &str = "robot.model = 'jackal'";
 
-/// Robot at the origin that drives at 0.4 m/s along x in a wide, scanned hall, beside a mover.
-fn guidance_beside(robot: &str, at: [f64; 2], velocity: [f64; 2]) -> GuidanceSample {
-    guidance_between(6.0, robot, at, velocity)
-}
-
-/// Same hall with two walls at `wall_m` metres from the robot's way.
-fn guidance_between(wall_m: f64, robot: &str, at: [f64; 2], velocity: [f64; 2]) -> GuidanceSample {
+/// Robot at the origin that drives at 0.4 m/s along x, beside a mover, in a scanned hall with two
+/// walls at `wall_m` metres from its way.
+fn guidance_beside(wall_m: f64, robot: &str, at: [f64; 2], velocity: [f64; 2]) -> GuidanceSample {
     let pose = PoseSample { v_m_s: 0.4, ..PoseSample::default() };
     in_hall(wall_m, robot).guidance(&pose, at, velocity)
 }
@@ -515,7 +506,7 @@ fn a_robot_that_movers_kept_from_its_way_for_long_goes_on_where_it_rests_in_time
 fn what_goes_away_or_passes_far_off_changes_no_guidance() {
     let speed = mission_with(KOBUKI).speed_m_s();
     for (at, velocity) in [([1.5, 0.0], [1.5, 0.0]), ([0.0, 3.0], [1.0, 0.0])] {
-        let guidance = guidance_beside(KOBUKI, at, velocity);
+        let guidance = guidance_beside(6.0, KOBUKI, at, velocity);
         assert_eq!(guidance.status(), Along);
         assert!(guidance.ex > 0.99 && guidance.signed_limit_m_s() >= speed, "{guidance:?}");
     }
@@ -523,13 +514,13 @@ fn what_goes_away_or_passes_far_off_changes_no_guidance() {
 
 #[test]
 fn a_robot_gets_out_of_the_way_of_what_comes_early_or_stands() {
-    let near = guidance_beside(JACKAL, [2.5, 0.1], [-0.8, 0.0]);
+    let near = guidance_beside(6.0, JACKAL, [2.5, 0.1], [-0.8, 0.0]);
     let aside = near.ey.abs() > 0.3 || near.maneuver() == Maneuver::Back;
     assert!(aside && near.status() == Along, "{near:?}");
     // A Jackal cannot back up, because its laser does not cover the rear.
-    let far = guidance_beside(JACKAL, [4.5, 0.1], [-1.2, 0.0]);
+    let far = guidance_beside(6.0, JACKAL, [4.5, 0.1], [-1.2, 0.0]);
     assert!(far.status() == Along && far.ey.abs() > 0.3, "{far:?}");
-    let late = guidance_beside(KOBUKI, [1.2, 0.0], [-1.5, 0.0]);
+    let late = guidance_beside(6.0, KOBUKI, [1.2, 0.0], [-1.5, 0.0]);
     assert_eq!(late.status(), Waiting, "{late:?}");
 }
 
@@ -538,7 +529,7 @@ fn a_robot_does_not_take_a_wall_beside_what_comes_for_its_trace_and_does_not_ste
     let aside = |wall_m| {
         (13..19).any(|decimetres| {
             let at = [0.1 * f64::from(decimetres), 0.0];
-            let guidance = guidance_between(wall_m, JACKAL, at, [-0.4, 0.0]);
+            let guidance = guidance_beside(wall_m, JACKAL, at, [-0.4, 0.0]);
             guidance.ey.abs() > 0.3 && guidance.signed_limit_m_s() > 0.0
         })
     };
@@ -550,7 +541,7 @@ fn a_robot_backs_only_where_a_laser_looks() {
     let backs = |robot| {
         (2..30).any(|decimetres| {
             let at = [0.1 * f64::from(decimetres), 0.0];
-            guidance_beside(robot, at, [-0.8, 0.0]).maneuver() == Maneuver::Back
+            guidance_beside(6.0, robot, at, [-0.8, 0.0]).maneuver() == Maneuver::Back
         })
     };
     assert_eq!([KOBUKI, JACKAL].map(backs), [true, false]);
