@@ -168,15 +168,10 @@ mod tests {
     use crate::testing::mission;
 
     #[test]
-    fn voltages_alone_are_telemetry() {
+    fn voltages_alone_are_telemetry_and_bytes_on_the_wire_have_the_time_of_the_machine() {
         let mut stage = LinkStage::new(&mission(""));
         stage.power = Some(PowerSample::default());
         assert!(stage.has_telemetry());
-    }
-
-    #[test]
-    fn bytes_on_the_wire_have_the_time_of_the_machine() {
-        let mut stage = LinkStage::new(&mission(""));
         stage.carry(Progress::default(), &[1], 7, Direction::Sent);
         assert_eq!(stage.wire[0].1.machine_ns, 7);
     }

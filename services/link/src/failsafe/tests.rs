@@ -205,10 +205,19 @@ fn broken(by: Break) -> Failsafe {
 }
 
 #[test]
-fn each_cause_alone_leads_to_its_action_and_nothing_else_does() {
+fn each_cause_alone_leads_to_its_action_and_is_explained_by_what_was_seen_in_a_clause_without_an_end()
+ {
     assert_eq!(well().decides(), Decision::GO);
     for &(by, cause) in CASES {
-        assert_eq!(broken(by).decides(), Decision { action: action(cause), cause });
+        let mut failsafe = broken(by);
+        assert_eq!(failsafe.decides(), Decision { action: action(cause), cause });
+        let explained = failsafe.explain(cause, now());
+        // A slow base is explained once found.
+        let is_promised =
+            rule(cause).unwrap().when.contains("link.log") && cause != Cause::BaseSlow;
+        assert!(!is_promised || explained.is_some(), "{cause:?}");
+        let is_clause = |text: &String| text.len() > 20 && !text.ends_with('.');
+        assert!(explained.as_ref().is_none_or(is_clause), "{cause:?}: {explained:?}");
     }
 }
 
@@ -424,20 +433,5 @@ fn frames_that_go_elsewhere_while_acknowledgements_come_at_once_show_another_com
         }
         let condition = monitor.condition(Cause::AnotherCommander, now());
         assert_eq!(condition == Condition::Holds, is_found, "{why}");
-    }
-}
-
-#[test]
-fn a_cause_that_the_log_explains_is_explained_by_what_was_seen_in_a_clause_without_an_end() {
-    for &(by, cause) in CASES {
-        let mut failsafe = broken(by);
-        failsafe.decides();
-        let explained = failsafe.explain(cause, now());
-        // A slow base is explained once found.
-        let is_promised =
-            rule(cause).unwrap().when.contains("link.log") && cause != Cause::BaseSlow;
-        assert!(!is_promised || explained.is_some(), "{cause:?}");
-        let is_clause = |text: String| text.len() > 20 && !text.ends_with('.');
-        assert!(explained.clone().is_none_or(is_clause), "{cause:?}: {explained:?}");
     }
 }
