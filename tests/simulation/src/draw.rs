@@ -7,7 +7,11 @@ use common::mission::Mission;
 use processes::stages;
 
 use crate::{
-    disturbance::{Disturbance, Request, What},
+    disturbance::{
+        Disturbance,
+        Request::{self, *},
+        What::*,
+    },
     load::Load,
     random::Random,
     robot_fault::RobotFault,
@@ -49,8 +53,8 @@ pub(crate) fn robot(random: &mut Random, mission: &mut Mission) {
 pub(crate) fn while_waiting(random: &mut Random, mission: &Mission) -> Vec<Request> {
     let asked = if mission.stay { ASKED } else { 0 };
     let ask = |_| match random.below(3) {
-        0 => Request::Hand([random.within(-1.0, 1.0), random.within(-1.0, 1.0)]),
-        _ => Request::Goto(on_the_way(random, mission)),
+        0 => Hand([random.within(-1.0, 1.0), random.within(-1.0, 1.0)]),
+        _ => Goto(on_the_way(random, mission)),
     };
     (0..asked).map(ask).collect()
 }
@@ -66,8 +70,8 @@ pub(crate) fn disturbances(random: &mut Random, mission: &Mission) -> Vec<Distur
         one(random, mission, at, &mut all);
     }
     // A robot that an operator has stopped, or that does not obey, would wait for ever.
-    all.push(Disturbance { at: RESUMED, what: What::Fault(None) });
-    all.push(Disturbance { at: RESUMED, what: What::Ask(Request::Resume) });
+    all.push(Disturbance { at: RESUMED, what: Fault(None) });
+    all.push(Disturbance { at: RESUMED, what: Ask(Resume) });
     all
 }
 
@@ -78,14 +82,14 @@ fn one(random: &mut Random, mission: &Mission, at: Duration, all: &mut Vec<Distu
     let now = Duration::ZERO;
     let mut add = |after: Duration, what| all.push(Disturbance { at: at + after, what });
     match random.below(15) {
-        0..=2 => add(now, What::Kill(stage)),
-        3..=4 => add(now, What::KillAfter(stage, operations)),
+        0..=2 => add(now, Kill(stage)),
+        3..=4 => add(now, KillAfter(stage, operations)),
         5 => {
-            add(now, What::Freeze(stage));
-            add(lasts, What::Thaw(stage));
+            add(now, Freeze(stage));
+            add(lasts, Thaw(stage));
         }
-        6 => add(now, What::Hang(stage)),
-        7 => add(now, What::KillSupervisor(operations)),
+        6 => add(now, Hang(stage)),
+        7 => add(now, KillSupervisor(operations)),
         8..=9 => {
             let mut share = || match random.below(4) {
                 0..=1 => 0.0,
@@ -95,33 +99,33 @@ fn one(random: &mut Random, mission: &Mission, at: Duration, all: &mut Vec<Distu
             let (lost, doubled, reordered) = (share(), share(), share());
             let delay = LONGEST_DELAY.mul_f64(share());
             let way = if share() > 0.0 { Way::ToRobot } else { Way::ToHost };
-            add(now, What::Wire(way, Quality { lost, doubled, reordered, delay }));
-            add(lasts, What::Wire(way, Quality::default()));
+            add(now, Wire(way, Quality { lost, doubled, reordered, delay }));
+            add(lasts, Wire(way, Quality::default()));
         }
         10 => {
-            add(now, What::Ask(Request::Stop));
+            add(now, Ask(Stop));
             if random.chance(0.5) {
-                add(lasts / 2, What::Ask(Request::Place));
+                add(lasts / 2, Ask(Place));
             }
-            add(lasts, What::Ask(Request::Resume));
+            add(lasts, Ask(Resume));
         }
         11..=12 => {
             let faults = RobotFault::value_variants().iter().copied();
             let faults: Vec<_> = faults.filter(|fault| fault.has_meaning(mission)).collect();
             if let Some(fault) = faults.get(random.below(faults.len())) {
-                add(now, What::Fault(Some(*fault)));
-                add(lasts, What::Fault(None));
+                add(now, Fault(Some(*fault)));
+                add(lasts, Fault(None));
             }
         }
         13 => {
             let place = on_the_way(random, mission);
-            add(now, What::Ask(Request::AddZone(place)));
-            add(lasts, What::Ask(Request::RemoveZone(place)));
+            add(now, Ask(AddZone(place)));
+            add(lasts, Ask(RemoveZone(place)));
         }
         _ => {
             let place = on_the_way(random, mission);
-            let requests = [Request::Goto(place), Request::Append(place), Request::Restart(stage)];
-            add(now, What::Ask(requests[random.below(requests.len())]));
+            let requests = [Goto(place), Append(place), Restart(stage)];
+            add(now, Ask(requests[random.below(requests.len())]));
         }
     }
 }

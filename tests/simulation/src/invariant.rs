@@ -124,28 +124,25 @@ impl Invariants {
     }
 
     pub(crate) fn on_disturbance(&mut self, what: &What, now: Duration) {
+        use What::*;
         match what {
-            What::Kill(stage)
-            | What::KillAfter(stage, _)
-            | What::Freeze(stage)
-            | What::Thaw(stage)
-            | What::Hang(stage)
-            | What::Break(stage, _)
-            | What::Ask(Request::Restart(stage)) => self.disturbed.push((stage, now)),
-            What::Wire(Way::ToRobot, quality) => {
+            Kill(stage)
+            | KillAfter(stage, _)
+            | Freeze(stage)
+            | Thaw(stage)
+            | Hang(stage)
+            | Break(stage, _)
+            | Ask(Request::Restart(stage)) => self.disturbed.push((stage, now)),
+            Wire(Way::ToRobot, quality) => {
                 self.wire_is_calm = *quality == Quality::default();
                 self.obedience_changed = now;
             }
-            What::Fault(fault) => {
+            Fault(fault) => {
                 self.obeys = !fault.is_some_and(RobotFault::keeps_speed);
                 self.obedience_changed = now;
                 self.has_lied |= fault.is_some_and(RobotFault::lies);
             }
-            What::KillSupervisor(_)
-            | What::Wire(..)
-            | What::Ask(_)
-            | What::Beacon(_)
-            | What::End => {}
+            _ => {}
         }
     }
 

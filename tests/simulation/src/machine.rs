@@ -495,40 +495,41 @@ impl SimulatedMachine {
     }
 
     fn disturb(&self, what: &What) {
+        use What::*;
         self.invariants.borrow_mut().on_disturbance(what, self.now());
         match what {
-            What::Kill(stage) => {
+            Kill(stage) => {
                 self.with(stage, |process| self.end(process, killed_by(Signal::KILL)));
             }
-            What::KillAfter(stage, operations) => {
+            KillAfter(stage, operations) => {
                 if let Some(process) = self.process_of(stage) {
                     self.doomed.borrow_mut().insert(process, *operations);
                 }
             }
-            What::KillSupervisor(operations) => self.kill_supervisor(*operations),
-            What::Freeze(stage) => self.with(stage, |process| process.frozen = true),
-            What::Thaw(stage) => self.with(stage, |process| {
+            KillSupervisor(operations) => self.kill_supervisor(*operations),
+            Freeze(stage) => self.with(stage, |process| process.frozen = true),
+            Thaw(stage) => self.with(stage, |process| {
                 process.frozen = false;
                 process.due_ns = process.due_ns.max(self.now_ns.get());
             }),
-            What::Hang(stage) => {
+            Hang(stage) => {
                 self.with(stage, |process| process.spins_since_ns = Some(self.now_ns.get()));
             }
-            What::Wire(way, quality) => self.wires.borrow_mut().set_quality(*way, *quality),
-            What::Ask(request) => self.ask(*request),
+            Wire(way, quality) => self.wires.borrow_mut().set_quality(*way, *quality),
+            Ask(request) => self.ask(*request),
             // Nobody hears either while there is no bus.
-            What::Break(stage, kind) => {
+            Break(stage, kind) => {
                 let _ = self.as_operator(|bus| inject(bus, stage, *kind));
             }
-            What::Beacon(place) => {
+            Beacon(place) => {
                 let _ = self.as_operator(|bus| say_beacon(bus, *place));
             }
-            What::Fault(fault) => {
+            Fault(fault) => {
                 if let Some(faults) = &self.faults {
                     faults.borrow_mut().set(*fault);
                 }
             }
-            What::End => {
+            End => {
                 self.is_ended.set(true);
                 self.kill_supervisor(0);
             }

@@ -13,6 +13,8 @@ use mission_control::{
 use simulation::Scenario;
 use summary::Summary;
 
+use Outcome::*;
+
 /// Settings under which every arrival is sure, in a time that suffices for every robot.
 const SURE: [&str; 2] = ["sure_within_m=9", "timeout_s=900"];
 const PAPER: &str = "method='paper'";
@@ -44,7 +46,7 @@ fn ends(mission: &str, settings: &[&str], outcome: Outcome) -> Summary {
 
 #[track_caller]
 fn arrives_untouched(mission: &str, settings: &[&str]) -> Summary {
-    let summary = ends(mission, settings, Outcome::Reached);
+    let summary = ends(mission, settings, Reached);
     assert_eq!(summary.collisions, Some(0), "{mission}, {settings:?}");
     summary
 }
@@ -87,7 +89,7 @@ fn wheels_and_sonar_as_measured_under_a_fading_radio_touch_nothing() {
         let settings = ["simulation.realism='measured'", fading, &seed];
         let summary = drive("obstacle-course", &settings);
         // Measured wheels drift, and this test ignores the error of the believed target.
-        let arrived = [Outcome::Reached, Outcome::ReachedUnsure, Outcome::WrongPlace];
+        let arrived = [Reached, ReachedUnsure, WrongPlace];
         assert!(arrived.contains(&summary.outcome), "{seed}: {summary:?}");
         assert_eq!(summary.collisions, Some(0), "{seed}");
     }
@@ -115,7 +117,7 @@ fn mission_time_and_timeout_count_the_time_in_which_nobody_hears_the_robot() {
     };
     let silent = silent_share(&drive("obstacle-course", &[out]));
     assert!((0.1..0.3).contains(&silent), "{silent}");
-    let late = ends("obstacle-course", &[out, "timeout_s=8"], Outcome::Timeout);
+    let late = ends("obstacle-course", &[out, "timeout_s=8"], Timeout);
     assert!((7.5..=8.0).contains(&late.mission_time_s), "{late:?}");
     let never = silent_share(&drive("obstacle-course", &[]));
     assert!(never.abs() < 1e-4, "{never}");
@@ -154,7 +156,7 @@ fn a_car_that_faces_a_wall_too_near_to_turn_ends_with_its_turning_radius() {
                 {points=[[0.5,-0.6],[-0.3,-0.6]]}]";
     let long = "timeout_s=600";
     arrives_untouched("open-room", &[wall, long]);
-    let summary = ends("open-room", &[CAR, wall, long], Outcome::Unreachable);
+    let summary = ends("open-room", &[CAR, wall, long], Unreachable);
     assert_eq!(summary.collisions, Some(0), "{summary:?}");
     assert!(summary.reason.contains("0.31 m"), "{summary:?}");
 }
@@ -170,7 +172,7 @@ fn an_empty_room_or_hall_is_crossed_straight_ahead_and_without_a_safety_event() 
     assert!(detour(&turned) < 1.1, "{turned:?}");
     let hall = "target = [7, 0]\nsensors = 'front'\nsimulation.realism = 'laboratory'\n\
                 perimeter = { width_m = 20, centre = [3.5, 0] }";
-    text_ends(hall, Outcome::Reached);
+    text_ends(hall, Reached);
 }
 
 #[test]
@@ -179,20 +181,20 @@ fn by_the_papers_method_a_known_course_is_crossed_faster_than_an_unknown_one() {
                  {at=[2.3,-1.7],radius_m=0.3},{at=[3.9,1.2],radius_m=0.3}]";
     let laboratory = "simulation.realism='laboratory'";
     let sensing = drive("obstacle-course", &[PAPER, SLOW, laboratory]);
-    let knowing = ends("obstacle-course", &[PAPER, SLOW, laboratory, known], Outcome::Reached);
+    let knowing = ends("obstacle-course", &[PAPER, SLOW, laboratory, known], Reached);
     assert!(knowing.mission_time_s < sensing.mission_time_s, "{knowing:?} against {sensing:?}");
 }
 
 #[test]
 fn a_touch_ends_the_mission_as_a_collision() {
     // The robot is blind, because hits beyond 5 cm are not mapped.
-    let summary = ends("obstacle-course", &[PAPER, "mapper.map_within_m=0.05"], Outcome::Collision);
+    let summary = ends("obstacle-course", &[PAPER, "mapper.map_within_m=0.05"], Collision);
     assert!(summary.collisions > Some(0), "{summary:?}");
 }
 
 #[test]
 fn a_target_where_the_robot_stands_is_reached_in_a_finite_ratio() {
-    let printed = ends("open-room", &["target=[0,0]"], Outcome::Reached).to_string();
+    let printed = ends("open-room", &["target=[0,0]"], Reached).to_string();
     assert!(!printed.contains("NaN") && !printed.contains("inf"), "{printed}");
 }
 
@@ -200,17 +202,17 @@ fn a_target_where_the_robot_stands_is_reached_in_a_finite_ratio() {
 fn a_target_behind_closed_walls_is_called_unreachable() {
     let walls = "world.wall=[{points=[[2.4,-3.4],[2.4,3.4]]},{points=[[-1.9,1.4],[2.6,1.4]]},\
                  {points=[[-1.9,-1.4],[2.6,-1.4]]},{points=[[-1.7,-1.6],[-1.7,1.6]]}]";
-    ends("open-room", &[walls], Outcome::Unreachable);
-    ends("open-room", &[walls, PAPER, "mapper.margin_m=0.35"], Outcome::Unreachable);
+    ends("open-room", &[walls], Unreachable);
+    ends("open-room", &[walls, PAPER, "mapper.margin_m=0.35"], Unreachable);
 }
 
 #[test]
 fn a_wheel_that_is_blocked_for_5_s_costs_a_fresh_planner_and_for_ever_the_target() {
     let block = "simulation.block=[{wheels='left',from_s=7,until_s=12}]";
-    let blocked = ends("open-room", &[SLOW, block], Outcome::Reached);
+    let blocked = ends("open-room", &[SLOW, block], Reached);
     assert!(blocked.replans > 0, "{blocked:?}");
     let block = "simulation.block=[{wheels='both',from_s=7}]";
-    let held = ends("open-room", &[SLOW, block], Outcome::Unreachable);
+    let held = ends("open-room", &[SLOW, block], Unreachable);
     assert!(held.reason.contains("held fast") && held.replans > 1, "{held:?}");
 }
 
@@ -218,7 +220,7 @@ fn a_wheel_that_is_blocked_for_5_s_costs_a_fresh_planner_and_for_ever_the_target
 fn by_its_laser_a_robot_whose_wheels_are_not_what_they_should_be_knows_where_it_is() {
     for seed in seeds(3) {
         let settings = [KOBUKI, "controller.speed_m_s=0.5", "simulation.realism='harsh'", &seed];
-        let summary = ends("obstacle-course", &settings, Outcome::Reached);
+        let summary = ends("obstacle-course", &settings, Reached);
         assert!(summary.pose_error_m < Some(0.12), "{seed}: {summary:?}");
     }
 }
@@ -231,7 +233,7 @@ fn a_laser_that_is_late_and_turns_slowly_and_says_so_places_the_robot_like_a_pro
         "simulation.laser={delay_s=0.3,sweep_s=0.2}",
     ] {
         let settings = ["robot.model='kobuki'", "seed=2", laser];
-        let summary = ends("obstacle-course", &settings, Outcome::Reached);
+        let summary = ends("obstacle-course", &settings, Reached);
         assert!(summary.pose_error_m < Some(0.1), "{laser}: {summary:?}");
     }
 }
@@ -241,12 +243,12 @@ fn a_long_robot_turns_behind_a_gap_narrower_than_its_length_and_refuses_to_in_a_
     let gap = "[{ points = [[1, -4], [1, -0.35]] }, { points = [[1, 0.35], [1, 4]] }]";
     let corridor = "[{ points = [[0.8, 0.4], [3.2, 0.4], [3.2, -0.4], [0.8, -0.4]] }]";
     for (targets, walls, outcome) in [
-        ("[[2.5, 0.5, 90]]", gap, Outcome::Reached),
-        ("[[2.5, 0]]\nstart.heading_deg = 90", gap, Outcome::Reached),
-        ("[[2.5, 0]]\nstart = [0, 1.2, -135]", gap, Outcome::Reached),
-        ("[[2.5, 0]]\nstart = [0, -1.2, 180]", gap, Outcome::Reached),
-        ("[[2.2, 0, 90]]", corridor, Outcome::Unreachable),
-        ("[[2.2, 0], [-0.5, 0, 180]]", corridor, Outcome::Reached),
+        ("[[2.5, 0.5, 90]]", gap, Reached),
+        ("[[2.5, 0]]\nstart.heading_deg = 90", gap, Reached),
+        ("[[2.5, 0]]\nstart = [0, 1.2, -135]", gap, Reached),
+        ("[[2.5, 0]]\nstart = [0, -1.2, 180]", gap, Reached),
+        ("[[2.2, 0, 90]]", corridor, Unreachable),
+        ("[[2.2, 0], [-0.5, 0, 180]]", corridor, Reached),
     ] {
         let text = format!(
             "targets = {targets}\nperimeter = {{ width_m = 8, centre = [1.5, 0] }}\n\
@@ -271,7 +273,7 @@ fn a_heavy_rectangle_passes_the_loose_end_of_a_wall_untouched_as_stated_and_as_f
                                         [-1.2, 1.897], [-1.2, -1.897]] }},\
                            {{ points = [[1.894, 0.466], [2.344, 2.141]] }}]"
         );
-        text_ends(&text, Outcome::Reached);
+        text_ends(&text, Reached);
     }
 }
 
@@ -282,7 +284,7 @@ fn a_robot_that_bumps_into_a_low_board_or_comes_to_a_hole_marks_it_and_goes_arou
         ("simulation.hole=[{at=[2,0],size_m=[0.4,0.8]}]", false),
     ] {
         let settings = [KOBUKI, SLOW, "simulation.goes_on_after_contact=true", world];
-        let summary = ends("open-room", &settings, Outcome::Reached);
+        let summary = ends("open-room", &settings, Reached);
         let found = (summary.collisions > Some(0), summary.replans, summary.resets);
         assert_eq!(found, (touches, 0, 0), "no wheel goes over the hole: {summary:?}");
     }
@@ -298,10 +300,10 @@ fn two_lasers_of_half_a_circle_cross_the_course_untouched() {
 
 #[test]
 fn a_low_battery_doubles_the_time_and_an_empty_one_ends_the_mission_with_the_reason() {
-    let full = ends("open-room", &["simulation.battery.start_v=7.8"], Outcome::Reached);
-    let low = ends("open-room", &["simulation.battery.start_v=6.5"], Outcome::Reached);
+    let full = ends("open-room", &["simulation.battery.start_v=7.8"], Reached);
+    let low = ends("open-room", &["simulation.battery.start_v=6.5"], Reached);
     assert!(low.mission_time_s > 1.5 * full.mission_time_s, "{low:?} against {full:?}");
-    let empty = ends("open-room", &["simulation.battery.start_v=5.9"], Outcome::Aborted);
+    let empty = ends("open-room", &["simulation.battery.start_v=5.9"], Aborted);
     assert_eq!(empty.cause.as_deref(), Some("battery empty"), "{empty:?}");
     assert!((1.9..3.0).contains(&empty.mission_time_s), "{empty:?}");
 }
@@ -310,7 +312,7 @@ fn a_low_battery_doubles_the_time_and_an_empty_one_ends_the_mission_with_the_rea
 fn the_targets_of_a_list_are_reached_in_turn_and_each_has_its_time_and_truth() {
     let text = "targets = [[1.5, -1.0], [2.5, 0.5, 180], [0.5, 0.8]]\n\
                 world.drum = [{ at = [2.0, 0.0], radius_m = 0.2 }]";
-    let summary = text_ends(text, Outcome::Reached);
+    let summary = text_ends(text, Reached);
     let targets = &summary.targets;
     assert!(targets.len() == 3 && targets.is_sorted_by_key(|it| it.at_s), "{summary:?}");
     let is_there = |it: &TargetResult| {
