@@ -80,34 +80,48 @@ impl Request {
         let target = |at: [f64; 2]| vec![TargetPoint::at(at.into())];
         let (id, asked_ns) = (monotonic_ns() | 1, monotonic_ns());
         let mut sample = RequestSample { id, asked_ns, ..RequestSample::default() };
-        let (kind, points) = match self {
-            Self::Stop => (RequestKind::Stop, vec![]),
+        let mut points = Vec::new();
+        let kind = match self {
+            Self::Stop => RequestKind::Stop,
             Self::LateStop => {
                 sample.asked_ns = 1;
-                (RequestKind::Stop, vec![])
+                RequestKind::Stop
             }
-            Self::Resume => (RequestKind::Resume, vec![]),
-            Self::Goto(at) => (RequestKind::Goto, target(at)),
-            Self::Append(at) => (RequestKind::Append, target(at)),
+            Self::Resume => RequestKind::Resume,
+            Self::Goto(at) => {
+                points = target(at);
+                RequestKind::Goto
+            }
+            Self::Append(at) => {
+                points = target(at);
+                RequestKind::Append
+            }
             Self::Restart(stage) => {
                 sample.stage = name(stage);
-                (RequestKind::Restart, vec![])
+                RequestKind::Restart
             }
-            Self::Hand(stick) => (RequestKind::Hand, target(stick)),
-            Self::Follow => (RequestKind::Follow, vec![]),
-            Self::EndFollow => (RequestKind::EndFollow, vec![]),
+            Self::Hand(stick) => {
+                points = target(stick);
+                RequestKind::Hand
+            }
+            Self::Follow => RequestKind::Follow,
+            Self::EndFollow => RequestKind::EndFollow,
             Self::Place => {
                 sample.deviations = PLACED;
-                let heading_rad = here.heading;
-                let at = TargetPoint { heading_rad, ..TargetPoint::at(here.position) };
-                (RequestKind::Place, vec![at])
+                points = target(here.position.into());
+                points[0].heading_rad = here.heading;
+                RequestKind::Place
             }
             Self::AddZone([x, y]) => {
                 let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
                 let at = |(right, up)| [x + ZONE_M * right, y + ZONE_M * up];
-                (RequestKind::AddZone, corners.map(at).into_iter().flat_map(target).collect())
+                points = corners.map(at).into_iter().flat_map(target).collect();
+                RequestKind::AddZone
             }
-            Self::RemoveZone(at) => (RequestKind::RemoveZone, target(at)),
+            Self::RemoveZone(at) => {
+                points = target(at);
+                RequestKind::RemoveZone
+            }
         };
         sample.kind = kind.into();
         sample.target_count = points.len() as u8;

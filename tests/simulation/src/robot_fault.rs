@@ -8,6 +8,7 @@ use glam::DVec2;
 use link::failsafe::stop_distance::from_faults;
 use serde::{Deserialize, Serialize};
 
+use self::Promise::*;
 use crate::random::Random;
 
 /// Time until some faults show. Counts of 0 first look like a restart of the robot, and swapped
@@ -104,9 +105,9 @@ impl Row {
             Some(causes.find(|(cause, _)| self.cause.as_deref() == Some(cause.name()))?.1.rest_s)
         };
         let rest_s = match self.promise {
-            Promise::Rests => by_cause()?,
-            Promise::RestsLater => by_cause()? + SHOWS_AFTER_S,
-            Promise::Unharmed | Promise::EndsAtRest => return None,
+            Rests => by_cause()?,
+            RestsLater => by_cause()? + SHOWS_AFTER_S,
+            Unharmed | EndsAtRest => return None,
         };
         Some(rest_s + 1.0 / mission.robot.rate_hz)
     }
@@ -160,19 +161,19 @@ impl RobotFault {
 
     /// Returns whether the robot says what is not so, and not only late, seldom or not at all.
     pub(crate) const fn lies(self) -> bool {
-        use RobotFault as F;
+        use RobotFault::*;
         !matches!(
             self,
-            F::Silence
-                | F::StreamsStop
-                | F::FramesLate
-                | F::FramesSlow
-                | F::LateFromBoot
-                | F::LateMidway
-                | F::Garbage
-                | F::HeldWheels
-                | F::DoesNotStop
-                | F::IgnoresZero
+            Silence
+                | StreamsStop
+                | FramesLate
+                | FramesSlow
+                | LateFromBoot
+                | LateMidway
+                | Garbage
+                | HeldWheels
+                | DoesNotStop
+                | IgnoresZero
         )
     }
 
@@ -200,7 +201,7 @@ mod tests {
             let name = &row.name;
             let times = [&light, &heavy].map(|mission| row.rest_within_s(mission));
             match row.promise {
-                Promise::Unharmed | Promise::EndsAtRest => assert_eq!(times, [None; 2], "{name}"),
+                Unharmed | EndsAtRest => assert_eq!(times, [None; 2], "{name}"),
                 _ => assert!(times[0].unwrap() + 0.3 < times[1].unwrap(), "{name}: {times:?}"),
             }
         }
@@ -214,10 +215,10 @@ mod tests {
             let Row { name, promise, cause, x80, json } = fault.row();
             assert_eq!(fault.to_possible_value().unwrap().get_name(), name);
             let promise = match promise {
-                Promise::Rests => "rests",
-                Promise::RestsLater => "rests later",
-                Promise::Unharmed => "unharmed",
-                Promise::EndsAtRest => "ends at rest",
+                Rests => "rests",
+                RestsLater => "rests later",
+                Unharmed => "unharmed",
+                EndsAtRest => "ends at rest",
             };
             let cause = cause.as_ref().map(|cause| format!(": {cause}")).unwrap_or_default();
             let promise = format!("{promise}{cause}");
