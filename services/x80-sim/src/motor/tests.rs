@@ -3,7 +3,7 @@
 use super::*;
 use crate::noise::Source;
 use crate::testing::near;
-use common::mission::Realism;
+use common::{mission::Realism, wire::Quantity::*};
 
 const DT: f64 = 0.005;
 
@@ -36,20 +36,20 @@ fn run(motor: &mut Motor, from: f64, seconds: f64) -> Vec<f64> {
 #[test]
 fn the_measured_loop_has_its_gain_and_answers_late() {
     let mut motor = motor(measured());
-    motor.order(Quantity::Velocity, 500, None);
+    motor.order(Velocity, 500, None);
     let speeds = run(&mut motor, 0.0, 2.0);
     let steady = 500.0 * measured().gain;
     near(speeds[399], steady, 0.01);
     let late = speeds.iter().position(|s| *s > 0.63 * steady).unwrap() as f64 * DT;
     assert!((0.14..=0.16).contains(&late), "delay and lag are {late} s");
-    motor.order(Quantity::Velocity, 25, None);
+    motor.order(Velocity, 25, None);
     assert_eq!(run(&mut motor, 2.0, 2.0)[399], 0.0, "25 * 0.78 lies in the dead band");
 }
 
 #[test]
 fn a_turning_wheel_jitters_as_much_as_measured_and_a_standing_one_not_at_all() {
     let mut motor = motor(WheelPhysics::preset(Realism::Measured));
-    motor.order(Quantity::Velocity, 500, Some(100.0));
+    motor.order(Velocity, 500, Some(100.0));
     let speeds = run(&mut motor, 0.0, 100.0);
     let settled = &speeds[200..];
     let mean = settled.iter().sum::<f64>() / settled.len() as f64;
@@ -63,7 +63,7 @@ fn a_turning_wheel_jitters_as_much_as_measured_and_a_standing_one_not_at_all() {
 fn a_wheel_told_to_stand_does_within_three_tenths_of_a_second() {
     for realism in [Realism::Laboratory, Realism::Measured] {
         let mut motor = motor(WheelPhysics::preset(realism));
-        motor.order(Quantity::Velocity, 400, Some(1.0));
+        motor.order(Velocity, 400, Some(1.0));
         let speeds = run(&mut motor, 0.0, 2.0);
         let after = speeds[200..].iter().position(|speed| *speed == 0.0);
         let seconds = after.map(|step| step as f64 * DT);
@@ -75,7 +75,7 @@ fn a_wheel_told_to_stand_does_within_three_tenths_of_a_second() {
 fn a_position_is_reached_the_shorter_way_round_to_the_last_count_by_a_measured_loop() {
     for (position, way) in [(-700, -700.0), (3, 3.0), (1200, 1200.0), (32_700, -68.0)] {
         let mut motor = motor(measured());
-        motor.order(Quantity::Position, position, Some(1.0));
+        motor.order(Position, position, Some(1.0));
         run(&mut motor, 0.0, 4.0);
         near(motor.turned, way, 1.5);
         assert_eq!(motor.speed, 0.0, "{way}");
@@ -88,17 +88,17 @@ fn half_a_pulse_width_stands_a_full_one_is_top_speed_and_8000_about_the_half_mov
     for (width, speed) in
         [(16_383, 0.0), (16_384 - 8000, 0.0), (16_383 + 8000, 0.0), (32_767, 2000.0), (0, -2000.0)]
     {
-        motor.order(Quantity::Pwm, width, None);
+        motor.order(Pwm, width, None);
         assert!((run(&mut motor, 0.0, 0.1)[19] - speed).abs() < 1e-6, "{width}");
     }
-    motor.order(Quantity::Pwm, 16_384 + 8100, None);
+    motor.order(Pwm, 16_384 + 8100, None);
     assert!(run(&mut motor, 0.0, 0.1)[19] > 0.0);
 }
 
 #[test]
 fn suspending_stops_and_resuming_does_not_start() {
     let mut motor = ideal();
-    motor.order(Quantity::Velocity, 400, None);
+    motor.order(Velocity, 400, None);
     motor.enable(false);
     motor.enable(true);
     run(&mut motor, 0.0, 1.0);

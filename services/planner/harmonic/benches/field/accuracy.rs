@@ -1,6 +1,10 @@
 //! Angles between computed and exact directions, after solves from scratch on thousands of maps.
 
-use crate::support::{Angles, CLEAR, Kind, Map, solve};
+use crate::support::{
+    Angles, CLEAR,
+    Kind::{self, *},
+    Map, solve,
+};
 use harmonic::solve_exactly;
 
 /// Maps per kind and screening.
@@ -9,16 +13,16 @@ const MAPS: u64 = 100;
 const SIDE: usize = 128;
 
 const KINDS: [Kind; 10] = [
-    Kind::Empty,
-    Kind::Drums,
-    Kind::Office,
-    Kind::Trap,
-    Kind::Maze { corridor: 4 },
-    Kind::Maze { corridor: 8 },
-    Kind::Maze { corridor: 32 },
-    Kind::Serpentine { corridor: 8 },
-    Kind::Noise { density: 0.1 },
-    Kind::Noise { density: 0.35 },
+    Empty,
+    Drums,
+    Office,
+    Trap,
+    Maze { corridor: 4 },
+    Maze { corridor: 8 },
+    Maze { corridor: 32 },
+    Serpentine { corridor: 8 },
+    Noise { density: 0.1 },
+    Noise { density: 0.35 },
 ];
 
 /// Prints the worst p50, p99 and maximum angles per kind of map.

@@ -29,7 +29,7 @@ mod wavefront;
 use std::time::Instant;
 
 use crate::split::{Measured, measured};
-use crate::support::{Kind, Map, solve_with};
+use crate::support::{Kind::*, Map, solve_with};
 use harmonic::{Cell, Domain, Solver};
 
 /// Returns the milliseconds of the fastest of `runs` calls.
@@ -83,11 +83,11 @@ fn full_table() {
     println!(
         "map                          cells method           scratch    target wavefront      x      x  dijkstra   log10 u"
     );
-    let kinds = [Kind::Empty, Kind::Drums, Kind::Office, Kind::Trap]
+    let kinds = [Empty, Drums, Office, Trap]
         .into_iter()
-        .chain([1, 4, 8, 16, 32, 64].map(|corridor| Kind::Maze { corridor }))
-        .chain([Kind::Noise { density: 0.35 }])
-        .chain([1, 8, 24].map(|corridor| Kind::Serpentine { corridor }));
+        .chain([1, 4, 8, 16, 32, 64].map(|corridor| Maze { corridor }))
+        .chain([Noise { density: 0.35 }])
+        .chain([1, 8, 24].map(|corridor| Serpentine { corridor }));
     for kind in kinds {
         full_row(&format!("{kind:?}"), &Map::generate(kind, 512, 512, 1).domain());
     }
@@ -103,7 +103,7 @@ fn others_than(domain: &Domain) -> [Domain; 2] {
     let blocked = rows.flatten().copied().collect();
     let target = Cell::new(domain.target().col, height - 1 - domain.target().row);
     let upside_down = support::domain(width, height, blocked, target);
-    [upside_down, Map::generate(Kind::Drums, width, height, 2).domain()]
+    [upside_down, Map::generate(Drums, width, height, 2).domain()]
 }
 
 fn full_row(name: &str, domain: &Domain) {

@@ -1,7 +1,10 @@
 //! Sweep over the map shapes that decide the cost of a solve: corridor and door width, obstacle
 //! density, depth of u.
 
-use crate::support::{Kind, Map};
+use crate::support::{
+    Kind::{self, *},
+    Map,
+};
 use harmonic::{Domain, Solver};
 
 use crate::split::{Measured, measured};
@@ -13,22 +16,22 @@ const RUNS: usize = 3;
 
 /// Returns the kinds of maps with their screening lengths.
 fn kinds() -> Vec<(Kind, f64)> {
-    let mut kinds = vec![Kind::Empty, Kind::Drums, Kind::Office];
+    let mut kinds = vec![Empty, Drums, Office];
     for corridor in [1, 2, 3, 4, 6, 8, 12, 16, 20, 24, 32, 48, 64] {
-        kinds.push(Kind::Serpentine { corridor });
-        kinds.push(Kind::Spiral { corridor });
-        kinds.push(Kind::Maze { corridor });
+        kinds.push(Serpentine { corridor });
+        kinds.push(Spiral { corridor });
+        kinds.push(Maze { corridor });
     }
     for side in [7, 15, 31, 63] {
         let doors = [1, 2, 4, 8, 16].into_iter().filter(|&door| door <= side);
-        kinds.extend(doors.map(|door| Kind::Rooms { side, door }));
+        kinds.extend(doors.map(|door| Rooms { side, door }));
     }
     let densities = [0.01, 0.03, 0.1, 0.2, 0.25, 0.3, 0.35, 0.38, 0.4, 0.45];
-    kinds.extend(densities.map(|density| Kind::Noise { density }));
+    kinds.extend(densities.map(|density| Noise { density }));
     let mut kinds: Vec<_> = kinds.into_iter().map(|kind| (kind, f64::INFINITY)).collect();
     // These lengths lower u across a hall by 1e-3 to 1e-2000.
     for length in [70.0, 20.0, 7.0, 3.0, 1.0, 0.5, 0.1] {
-        kinds.extend([Kind::Empty, Kind::Drums, Kind::Office].map(|kind| (kind, length)));
+        kinds.extend([Empty, Drums, Office].map(|kind| (kind, length)));
     }
     kinds
 }

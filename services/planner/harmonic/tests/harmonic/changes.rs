@@ -1,7 +1,7 @@
 //! Tests that solves from the previous field give the directions of a solve from scratch.
 
 use crate::support::{
-    Angles, CLEAR, Kind, Map, Random, block, leads_to_target, solve_near, solve_with,
+    Angles, CLEAR, Kind::*, Map, Random, block, leads_to_target, solve_near, solve_with,
 };
 use harmonic::{Change, Domain, Field, Solver, solve_exactly};
 
@@ -32,7 +32,7 @@ impl Case {
 #[test]
 fn after_a_block_in_one_of_two_corridors_the_directions_in_the_hall_that_they_feed_are_right() {
     for (wide, size) in [(8, (3, 3)), (12, (3, 8))] {
-        let mut map = Map::generate(Kind::Empty, 500, 256, 0);
+        let mut map = Map::generate(Empty, 500, 256, 0);
         map.fill(80..240, 0..256, true);
         for row in [70, 180] {
             map.fill(80..240, row..row + wide, false);
@@ -47,8 +47,8 @@ fn after_a_block_in_one_of_two_corridors_the_directions_in_the_hall_that_they_fe
 
 #[test]
 fn after_many_changes_every_cell_leads_to_the_target_and_all_directions_are_right() {
-    let unscreened = [Kind::Empty, Kind::Drums, Kind::Office].map(|kind| (kind, f64::INFINITY));
-    for (kind, length) in unscreened.into_iter().chain([(Kind::Office, 2.236)]) {
+    let unscreened = [Empty, Drums, Office].map(|kind| (kind, f64::INFINITY));
+    for (kind, length) in unscreened.into_iter().chain([(Office, 2.236)]) {
         let side = 120;
         let mut case = Case::new(Map::generate(kind, side, side, 3).screened(length));
         let mut random = Random::new(7);

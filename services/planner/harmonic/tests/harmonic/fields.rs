@@ -1,7 +1,7 @@
 //! Tests that full solves are right in every cell of every kind of map.
 
 use crate::support::{
-    Angles, CLEAR, Kind, Map, domain, leads_to_target, screened, solve, solve_near, solve_with,
+    Angles, CLEAR, Kind::*, Map, domain, leads_to_target, screened, solve, solve_near, solve_with,
     worst_residual,
 };
 use harmonic::{
@@ -27,7 +27,6 @@ fn assert_right(domain: &Domain, name: &str) -> Field {
 
 #[test]
 fn directions_are_within_a_degree_of_the_reference_on_every_kind_of_map() {
-    use Kind::*;
     let maze = |corridor| Maze { corridor };
     let every = [
         Empty,
@@ -61,7 +60,7 @@ fn directions_are_within_a_degree_of_the_reference_on_every_kind_of_map() {
 
 #[test]
 fn the_field_holds_down_to_ten_to_the_minus_twenty_thousand() {
-    let map = Map::generate(Kind::Serpentine { corridor: 2 }, 40, 4200, 0);
+    let map = Map::generate(Serpentine { corridor: 2 }, 40, 4200, 0);
     let least = assert_right(&map.domain(), "a serpentine of 4200 rows").log10_u_min();
     assert!(least < -20_000.0, "only down to 1e{least}");
 }
@@ -127,7 +126,7 @@ fn a_cancelled_solve_says_so() {
 
 #[test]
 fn a_wide_map_with_strong_screening_is_right_beyond_the_range_of_f64() {
-    let domain = Map::generate(Kind::Empty, 60, 800, 1).screened(length(5.0));
+    let domain = Map::generate(Empty, 60, 800, 1).screened(length(5.0));
     let field = assert_right(&domain, "a wide map");
     assert!(field.log10_u_min() < -700.0, "only down to 1e{}", field.log10_u_min());
     assert_eq!(field.verification().method, Method::MultigridBands);
@@ -135,7 +134,7 @@ fn a_wide_map_with_strong_screening_is_right_beyond_the_range_of_f64() {
 
 #[test]
 fn a_hall_with_a_long_passage_one_cell_wide_is_not_factorised_and_right_in_the_passage_too() {
-    let mut map = Map::generate(Kind::Empty, 260, 250, 0);
+    let mut map = Map::generate(Empty, 260, 250, 0);
     // The hall has a passage along its rim, closed except for a door.
     map.fill(2..258, 2..248, true);
     map.fill(6..254, 6..244, false);
@@ -153,7 +152,7 @@ fn a_hall_with_a_long_passage_one_cell_wide_is_not_factorised_and_right_in_the_p
 fn a_narrow_passage_beside_a_wide_one_is_right_where_its_far_end_takes_over() {
     // The narrow way loses 0.57 orders of magnitude per cell, the wide one 0.07. Beyond a certain
     // cell, the way back to the far end and around is better, by weights of 1e-400.
-    let mut map = Map::generate(Kind::Empty, 1520, 25, 0);
+    let mut map = Map::generate(Empty, 1520, 25, 0);
     map.fill(15..1505, 21..22, true);
     map.fill(15..1505, 23..25, true);
     map.aim((5, 12));
@@ -169,7 +168,7 @@ fn a_narrow_passage_beside_a_wide_one_is_right_where_its_far_end_takes_over() {
 #[test]
 fn double_precision_solves_what_fails_verification_in_single_precision_and_has_no_memory_to_be_factorised()
  {
-    let noise = Kind::Noise { density: 0.198_829_310_110_751_3 };
+    let noise = Noise { density: 0.198_829_310_110_751_3 };
     let domain = Map::generate(noise, 299, 261, 1236).domain();
     let mut solver = Solver::new(Settings { memory_limit: 16 << 20, ..Settings::default() });
     let field = solve_with(&mut solver, &domain);
@@ -183,11 +182,11 @@ fn double_precision_solves_what_fails_verification_in_single_precision_and_has_n
 #[test]
 fn open_maps_converge_within_a_few_cycles() {
     for (kind, length, most) in [
-        (Kind::Empty, f64::INFINITY, 4),
-        (Kind::Drums, f64::INFINITY, 8),
-        (Kind::Office, f64::INFINITY, 25),
-        (Kind::Drums, 20.0, 8),
-        (Kind::Noise { density: 0.1 }, f64::INFINITY, 20),
+        (Empty, f64::INFINITY, 4),
+        (Drums, f64::INFINITY, 8),
+        (Office, f64::INFINITY, 25),
+        (Drums, 20.0, 8),
+        (Noise { density: 0.1 }, f64::INFINITY, 20),
     ] {
         let domain = Map::generate(kind, 301, 233, 1).screened(length);
         let mut cycles = 0;

@@ -1,7 +1,10 @@
 //! Tests of the guidance at any position of a solved map.
 
-use crate::support::{Kind, Map, Random, angle, cells, solve};
-use harmonic::{Cell, Domain, Field, Guidance};
+use crate::support::{
+    Kind::{self, *},
+    Map, Random, angle, cells, solve,
+};
+use harmonic::{Cell, Domain, Field, Guidance::*};
 
 fn generated(kind: Kind, seed: u64) -> (Domain, Field) {
     let domain = Map::generate(kind, 40, 30, seed).domain();
@@ -13,13 +16,8 @@ fn cell_at([col, row]: [f64; 2]) -> Cell {
     Cell::new(col.round() as usize, row.round() as usize)
 }
 
-const KINDS: [Kind; 5] = [
-    Kind::Drums,
-    Kind::Maze { corridor: 1 },
-    Kind::Maze { corridor: 3 },
-    Kind::Trap,
-    Kind::Noise { density: 0.35 },
-];
+const KINDS: [Kind; 5] =
+    [Drums, Maze { corridor: 1 }, Maze { corridor: 3 }, Trap, Noise { density: 0.35 }];
 
 #[test]
 fn following_the_guidance_from_anywhere_arrives_without_entering_a_blocked_cell() {
@@ -30,7 +28,7 @@ fn following_the_guidance_from_anywhere_arrives_without_entering_a_blocked_cell(
         while walks < 60 {
             let start = [random.between(0.0, 39.0), random.between(0.0, 29.0)];
             let (mut at, mut steps) = (start, 0);
-            while let Guidance::Along(d) = field.guidance(at[0], at[1]) {
+            while let Along(d) = field.guidance(at[0], at[1]) {
                 at = [at[0] + 0.02 * d[0], at[1] + 0.02 * d[1]];
                 steps += 1;
                 assert!(steps < 200_000, "{kind:?}: no arrival from {start:?}, stuck at {at:?}");
@@ -39,7 +37,7 @@ fn following_the_guidance_from_anywhere_arrives_without_entering_a_blocked_cell(
             if steps > 0 {
                 walks += 1;
                 let end = field.guidance(at[0], at[1]);
-                assert_eq!(end, Guidance::AtTarget, "{kind:?}: at {at:?}, from {start:?}");
+                assert_eq!(end, AtTarget, "{kind:?}: at {at:?}, from {start:?}");
             }
         }
     }
@@ -81,7 +79,7 @@ fn guidance_never_points_into_a_wall_it_touches() {
                 }
                 let along = random.between(-0.499, 0.499);
                 let at = [col + 0.499_999_9 * dc + along * dr, row + 0.499_999_9 * dr + along * dc];
-                if let Guidance::Along(d) = field.guidance(at[0], at[1]) {
+                if let Along(d) = field.guidance(at[0], at[1]) {
                     // Under the saddle rule, the direction may lean towards the centre line of the
                     // cell, but never outwards.
                     assert!(
@@ -96,7 +94,7 @@ fn guidance_never_points_into_a_wall_it_touches() {
 
 #[test]
 fn guidance_is_continuous_across_cell_borders_in_open_space() {
-    let (domain, field) = generated(Kind::Drums, 5);
+    let (domain, field) = generated(Drums, 5);
     let mut random = Random::new(11);
     let mut compared = 0;
     for _ in 0..20_000 {
@@ -108,7 +106,7 @@ fn guidance_is_continuous_across_cell_borders_in_open_space() {
         for border in [col as f64 + 0.5, col as f64] {
             let y = row as f64 + random.between(-0.49, 0.49);
             let (a, b) = (field.guidance(border - 1e-7, y), field.guidance(border + 1e-7, y));
-            if let (Guidance::Along(a), Guidance::Along(b)) = (a, b) {
+            if let (Along(a), Along(b)) = (a, b) {
                 compared += 1;
                 assert!(angle(a, b) < 0.5, "a jump of {} degrees at ({border}, {y})", angle(a, b));
             }
@@ -121,13 +119,13 @@ fn guidance_is_continuous_across_cell_borders_in_open_space() {
 fn at_a_saddle_point_the_better_neighbour_decides() {
     // The target is behind a wall, mirrored about row 4. At the middle of the wall, the gradient
     // along it is zero by symmetry and that across it points away.
-    let mut map = Map::generate(Kind::Empty, 13, 9, 0);
+    let mut map = Map::generate(Empty, 13, 9, 0);
     map.fill(7..8, 2..7, true);
     map.aim((10, 4));
     let field = solve(&map.domain());
     for col in 1..7 {
         assert!(
-            matches!(field.guidance(col as f64, 4.0), Guidance::Along(d) if d[0].hypot(d[1]) > 0.999),
+            matches!(field.guidance(col as f64, 4.0), Along(d) if d[0].hypot(d[1]) > 0.999),
             "{col}"
         );
     }
@@ -135,22 +133,22 @@ fn at_a_saddle_point_the_better_neighbour_decides() {
 
 #[test]
 fn every_position_gets_its_typed_answer() {
-    let mut map = Map::generate(Kind::Empty, 12, 12, 0);
+    let mut map = Map::generate(Empty, 12, 12, 0);
     map.fill(6..12, 0..12, true);
     map.fill(8..10, 4..6, false);
     map.aim((2, 2));
     let field = solve(&map.domain());
-    assert_eq!(field.guidance(2.4, 1.7), Guidance::AtTarget);
-    assert_eq!(field.guidance(8.0, 5.0), Guidance::Unreachable);
-    assert_eq!(field.guidance(f64::NAN, 5.0), Guidance::Unreachable);
-    assert_eq!(field.guidance(6.2, 5.0), Guidance::WayOut([-1.0, 0.0]));
-    assert!(matches!(field.guidance(-1e300, 3.0), Guidance::WayOut(d) if d[0] > 0.99));
-    assert!(matches!(field.guidance(11.0, 11.0), Guidance::WayOut(d) if d[0] < 0.0));
+    assert_eq!(field.guidance(2.4, 1.7), AtTarget);
+    assert_eq!(field.guidance(8.0, 5.0), Unreachable);
+    assert_eq!(field.guidance(f64::NAN, 5.0), Unreachable);
+    assert_eq!(field.guidance(6.2, 5.0), WayOut([-1.0, 0.0]));
+    assert!(matches!(field.guidance(-1e300, 3.0), WayOut(d) if d[0] > 0.99));
+    assert!(matches!(field.guidance(11.0, 11.0), WayOut(d) if d[0] < 0.0));
 }
 
 #[test]
 fn the_direction_of_a_cell_is_the_guidance_at_its_centre_and_the_policy_of_its_row() {
-    let large = (Kind::Noise { density: 0.12 }, 200, 200);
+    let large = (Noise { density: 0.12 }, 200, 200);
     for (kind, width, height) in KINDS.map(|kind| (kind, 60, 45)).into_iter().chain([large]) {
         let field = solve(&Map::generate(kind, width, height, 3).domain());
         for row in 0..height {
@@ -159,7 +157,7 @@ fn the_direction_of_a_cell_is_the_guidance_at_its_centre_and_the_policy_of_its_r
             assert_eq!(policies.len(), width);
             for (col, policy) in policies.iter().enumerate() {
                 let at_centre = match field.guidance(col as f64, row as f64) {
-                    Guidance::Along(direction) => Some(direction),
+                    Along(direction) => Some(direction),
                     _ => None,
                 };
                 let cell = Cell::new(col, row);

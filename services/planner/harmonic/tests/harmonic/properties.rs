@@ -2,8 +2,8 @@
 //! target.
 
 use crate::support::{
-    Angles, Kind, Map, Random, around, cells, domain, leads_to_target, screened, solve, solve_near,
-    solve_with, worst_residual,
+    Angles, Kind::*, Map, Random, around, cells, domain, leads_to_target, screened, solve,
+    solve_near, solve_with, worst_residual,
 };
 use harmonic::{Cell, Change, Domain, Field, Guidance, Settings, Solver, solve_exactly};
 use proptest::prelude::*;
@@ -97,8 +97,8 @@ proptest! {
     fn a_field_solved_after_any_changes_from_the_one_before_leads_to_the_target_from_every_cell_that_can_reach_it(
         seed in any::<u64>(),
         kind in prop::sample::select(vec![
-            Kind::Empty, Kind::Drums, Kind::Office, Kind::Trap, Kind::Maze { corridor: 1 }, Kind::Maze { corridor: 5 },
-            Kind::Maze { corridor: 16 }, Kind::Serpentine { corridor: 8 }, Kind::Noise { density: 0.2 }
+            Empty, Drums, Office, Trap, Maze { corridor: 1 }, Maze { corridor: 5 },
+            Maze { corridor: 16 }, Serpentine { corridor: 8 }, Noise { density: 0.2 }
         ]),
         changes in prop::collection::vec((0_usize..150, 0_usize..150, any::<bool>()), 1..30),
     ) {
@@ -120,7 +120,7 @@ proptest! {
 
 #[test]
 fn a_set_up_that_was_patched_gives_the_same_field_bit_for_bit() {
-    let mut map = Map::generate(Kind::Drums, 200, 170, 4);
+    let mut map = Map::generate(Drums, 200, 170, 4);
     let mut solver = Solver::default();
     for step in 0..12 {
         map.fill(40 + 9 * step..43 + 9 * step, 60..64, step % 3 != 0);
@@ -138,7 +138,7 @@ fn a_set_up_that_was_patched_gives_the_same_field_bit_for_bit() {
 
 #[test]
 fn more_threads_give_the_same_field_and_verification() {
-    let domain = Map::generate(Kind::Drums, 900, 800, 3).domain();
+    let domain = Map::generate(Drums, 900, 800, 3).domain();
     let solve = |threads| {
         let threads = std::num::NonZeroUsize::new(threads).expect("at least one");
         solve_with(&mut Solver::new(Settings { threads, ..Settings::default() }), &domain)

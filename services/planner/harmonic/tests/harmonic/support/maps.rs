@@ -7,6 +7,8 @@ use harmonic::{Cell, Domain};
 
 use super::{around, cells, domain, screened};
 
+use Kind::*;
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Kind {
     /// Outer walls only.
@@ -45,24 +47,24 @@ impl Map {
         let mut map =
             Self { width, height, blocked: vec![false; width * height], target: Cell::new(0, 0) };
         let wanted = match kind {
-            Kind::Empty | Kind::Noise { .. } => (width / 3, height / 4),
-            Kind::Drums | Kind::Office => (width / 6, height / 5),
-            Kind::Maze { corridor: side }
-            | Kind::Serpentine { corridor: side }
-            | Kind::Spiral { corridor: side }
-            | Kind::Rooms { side, .. } => (1 + side / 2, 1 + side / 2),
-            Kind::Trap => (width * 9 / 10, height / 2),
+            Empty | Noise { .. } => (width / 3, height / 4),
+            Drums | Office => (width / 6, height / 5),
+            Maze { corridor: side }
+            | Serpentine { corridor: side }
+            | Spiral { corridor: side }
+            | Rooms { side, .. } => (1 + side / 2, 1 + side / 2),
+            Trap => (width * 9 / 10, height / 2),
         };
         match kind {
-            Kind::Empty => {}
-            Kind::Drums => map.drums(random),
-            Kind::Office => map.office(random),
-            Kind::Maze { corridor } => map.maze(corridor, random),
-            Kind::Serpentine { corridor } => map.serpentine(corridor),
-            Kind::Spiral { corridor } => map.spiral(corridor),
-            Kind::Rooms { side, door } => map.rooms(side, door, random),
-            Kind::Trap => map.trap(),
-            Kind::Noise { density } => map.blocked.fill_with(|| random.unit() < density),
+            Empty => {}
+            Drums => map.drums(random),
+            Office => map.office(random),
+            Maze { corridor } => map.maze(corridor, random),
+            Serpentine { corridor } => map.serpentine(corridor),
+            Spiral { corridor } => map.spiral(corridor),
+            Rooms { side, door } => map.rooms(side, door, random),
+            Trap => map.trap(),
+            Noise { density } => map.blocked.fill_with(|| random.unit() < density),
         }
         map.block_rim();
         map.aim(wanted);
