@@ -19,7 +19,7 @@ fn lock_step(mission: &str, commands: usize) -> (Vec<u8>, Vec<GroundTruthTick>) 
         }
     }
     // Ground truth is written before a tick's frames.
-    (bytes, sim.truth())
+    (bytes, sim.finish())
 }
 
 #[test]

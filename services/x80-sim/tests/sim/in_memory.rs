@@ -51,7 +51,7 @@ fn at_max_its_datagrams_and_its_truth_are_those_of_a_process() {
         let as_told = |tick: GroundTruthTick| -> GroundTruthTick {
             serde_json::from_str(&serde_json::to_string(&tick).unwrap()).unwrap()
         };
-        let process = sim.truth();
+        let process = sim.finish();
         assert!(process.len() > 30, "{text}");
         assert_eq!(robot.truth().map(as_told).collect::<Vec<_>>(), process, "{text}");
     }

@@ -51,8 +51,8 @@ pub(crate) struct Sim {
     pub listening: String,
     /// Lines, read as they come: a robot waits for a slow reader.
     ground_truth: Receiver<String>,
-    stop: Option<UnixStream>,
-    thread: Option<JoinHandle<Result<(), SimError>>>,
+    stop: UnixStream,
+    thread: JoinHandle<Result<(), SimError>>,
 }
 
 impl Sim {
@@ -85,22 +85,17 @@ impl Sim {
         });
         let header: GroundTruthHeader =
             serde_json::from_str(&ground_truth.recv().unwrap()).unwrap();
-        Self { listening: header.listening, ground_truth, stop: Some(stop), thread: Some(thread) }
+        Self { listening: header.listening, ground_truth, stop, thread }
     }
 
     pub(crate) fn next_truth(&mut self) -> GroundTruthTick {
         serde_json::from_str(&self.ground_truth.recv_timeout(PATIENCE).unwrap()).unwrap()
     }
 
-    /// Stops the robot; its ground truth stays readable.
-    pub(crate) fn finish(&mut self) {
-        drop(self.stop.take());
-        self.thread.take().unwrap().join().unwrap().unwrap();
-    }
-
-    /// Finishes, and returns the unread ticks.
-    pub(crate) fn truth(mut self) -> Vec<GroundTruthTick> {
-        self.finish();
+    /// Stops the robot. Returns the unread ticks.
+    pub(crate) fn finish(self) -> Vec<GroundTruthTick> {
+        drop(self.stop);
+        self.thread.join().unwrap().unwrap();
         self.ground_truth.iter().map(|line| serde_json::from_str(&line).unwrap()).collect()
     }
 
@@ -109,15 +104,6 @@ impl Sim {
         socket.connect(&self.listening).unwrap();
         socket.set_read_timeout(Some(PATIENCE)).unwrap();
         socket
-    }
-}
-
-impl Drop for Sim {
-    fn drop(&mut self) {
-        drop(self.stop.take());
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
     }
 }
 
