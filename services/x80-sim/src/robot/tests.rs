@@ -7,22 +7,24 @@ use proptest::prelude::*;
 use super::*;
 use crate::testing::{ideal, near};
 
-mod car;
 mod realism;
 
 fn robot(text: &str) -> Robot {
     Robot::new(&ideal(text))
 }
 
-/// Returns the command's meaning to the robot, and the answer.
+/// Returns the frame's meaning to the robot, and the answer.
+fn hear(robot: &mut Robot, frame: &Frame<'_>) -> (Heard, Vec<u8>) {
+    let mut replies = Vec::new();
+    (robot.on_frame(frame, &mut replies), replies)
+}
+
 fn send_as(robot: &mut Robot, command: Command, addressing: Addressing) -> (Heard, Vec<u8>) {
     let mut bytes = Vec::new();
     command.encode(addressing, &mut bytes);
     let mut decoder = Decoder::default();
     decoder.push(&bytes);
-    let mut replies = Vec::new();
-    let heard = robot.on_frame(&decoder.next_frame().unwrap(), &mut replies);
-    (heard, replies)
+    hear(robot, &decoder.next_frame().unwrap())
 }
 
 fn send(robot: &mut Robot, command: Command) -> (Heard, Vec<u8>) {
@@ -52,17 +54,13 @@ fn dids(robot: &mut Robot) -> Vec<u8> {
 }
 
 fn motor(robot: &mut Robot) -> MotorSensors {
-    match streamed(robot).1.last() {
-        Some(Report::Motor(sensors)) => *sensors,
-        other => panic!("the last frame was {other:?}"),
-    }
+    let Some(Report::Motor(sensors)) = streamed(robot).1.pop() else { panic!() };
+    sensors
 }
 
 fn standard(robot: &mut Robot) -> StandardSensors {
-    match streamed(robot).1.first() {
-        Some(Report::Standard(sensors)) => *sensors,
-        other => panic!("the first frame was {other:?}"),
-    }
+    let Report::Standard(sensors) = streamed(robot).1[0] else { panic!() };
+    sensors
 }
 
 /// Goes on for `ticks`.
@@ -92,15 +90,11 @@ fn everything_to_the_robot_but_an_acknowledgement_is_acknowledged() {
     assert_eq!(send(&mut robot, Command::System(SystemSignal::Ping)).1, ack);
     let none = send(&mut robot, Command::System(SystemSignal::Ack));
     assert_eq!(none, (Heard::Ack, Vec::new()));
-    let mut answer = |frame: Frame<'_>| {
-        let mut replies = Vec::new();
-        (robot.on_frame(&frame, &mut replies), replies)
-    };
     let unknown = Frame { rid: 8, sn: 0, did: 99, data: &[1] };
-    assert_eq!(answer(unknown), (Heard::Other, ack.to_vec()));
+    assert_eq!(hear(&mut robot, &unknown), (Heard::Other, ack.to_vec()));
     // The robot ignores a frame that is addressed to a host.
     let reflected = Frame { rid: 0, sn: 0, did: 255, data: &[0] };
-    assert_eq!(answer(reflected), (Heard::Foreign, Vec::new()));
+    assert_eq!(hear(&mut robot, &reflected), (Heard::Foreign, Vec::new()));
 }
 
 #[test]
@@ -110,9 +104,8 @@ fn the_multimedia_board_acknowledges_and_moves_nothing() {
     forward(400, None).encode(Addressing::Numbered, &mut velocity);
     for (rid, heard, moves) in [(8, Heard::Other, false), (1, Heard::Motion, true)] {
         let frame = Frame { rid, sn: 0, did: velocity[4], data: &velocity[6..18] };
-        let mut replies = Vec::new();
-        assert_eq!(robot.on_frame(&frame, &mut replies), heard);
-        assert_eq!(replies.len(), 10, "an acknowledgement");
+        let (was, acknowledgement) = hear(&mut robot, &frame);
+        assert_eq!((was, acknowledgement.len()), (heard, 10));
         robot.advance_to(robot.time + 1.0);
         assert_eq!(robot.motors[1].turned > 0.0, moves);
     }
@@ -138,6 +131,18 @@ fn wheels_may_be_wired_the_other_way_round() {
     let ground_truth = after(&mut robot, 1);
     assert!(ground_truth.heading > 0.0 && ground_truth.omega > 0.0);
     assert_eq!((ground_truth.left_counts, ground_truth.right_counts), (0, 71));
+}
+
+#[test]
+fn the_steering_takes_its_time_ends_at_its_stop_and_turns_no_standing_car() {
+    let mut car = robot("robot.model = 'car'\nsimulation.wheels.lag_s = 0");
+    // 120 degrees/s are 1200 counts/s, the limit of any request; 30 degrees are 300 counts.
+    for (steering, ticks, counts) in [(5000, 1, 171), (5000, 14, 300), (-5000, 14, -300)] {
+        send(&mut car, Command::velocity([Some(0), Some(steering)], None));
+        let truth = after(&mut car, ticks);
+        assert!((counts_between(0, truth.right_counts) - counts).abs() <= 1, "{truth:?}");
+        assert_eq!((truth.x, truth.y, truth.heading), (0.0, 0.0, 0.0));
+    }
 }
 
 #[test]
@@ -203,8 +208,10 @@ fn enabling_and_a_speed_reach_their_channel() {
 fn a_line_of_truth_has_the_names_that_its_readers_know() {
     let line = serde_json::to_string(&robot("").ground_truth()).unwrap();
     let names: Vec<&str> = line.split('"').skip(1).step_by(2).collect();
-    let known = "tick time_s x y heading v omega clearance_m contacts left_counts right_counts sonar_cm stopping_time_s";
-    assert_eq!(names, known.split(' ').collect::<Vec<_>>());
+    assert_eq!(
+        names.join(" "),
+        "tick time_s x y heading v omega clearance_m contacts left_counts right_counts sonar_cm stopping_time_s"
+    );
 }
 
 #[test]
@@ -285,8 +292,7 @@ proptest! {
         ));
         for (did, data) in &frames {
             let frame = Frame { rid: 1, sn: 0, did: *did, data };
-            let mut replies = Vec::new();
-            let heard = robot.on_frame(&frame, &mut replies);
+            let (heard, replies) = hear(&mut robot, &frame);
             prop_assert_eq!(replies.is_empty(), heard == Heard::Ack);
             let due = robot.next_tick_s();
             robot.advance_to_next_tick();
