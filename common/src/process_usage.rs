@@ -61,7 +61,8 @@ mod tests {
         let mut processes = Processes::default();
         let began = Instant::now();
         let first = processes.look(&[own, 0], began);
-        assert_eq!(first[0].cpu, None, "nothing to compare with");
+        // Nothing to compare with.
+        assert_eq!(first[0].cpu, None);
         assert!(first[0].memory_bytes > Some(1 << 20));
         assert_eq!(first[1], Usage::default());
         let used = processor_time(own).unwrap();

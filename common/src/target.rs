@@ -59,13 +59,18 @@ mod tests {
     fn a_target_is_taken_once_and_in_its_tick_but_by_a_stage_that_has_none_at_once() {
         let sample =
             |number, since_tick| TargetSample { number, since_tick, ..TargetSample::default() };
-        assert!(takes(&mut None, &sample(0, 0), 3), "the start, where a robot waits");
+        // The start, where a robot waits.
+        assert!(takes(&mut None, &sample(0, 0), 3));
         let mut taken = None;
         let mut takes = |sample, tick| takes(&mut taken, &sample, tick);
-        assert!(takes(sample(2, 9), 3), "none before");
-        assert!(!takes(sample(2, 9), 9), "it is taken");
-        assert!(!takes(sample(1, 0), 9), "an older one");
-        assert!(!takes(sample(3, 12), 11), "early");
+        // None before.
+        assert!(takes(sample(2, 9), 3));
+        // It is taken.
+        assert!(!takes(sample(2, 9), 9));
+        // An older one.
+        assert!(!takes(sample(1, 0), 9));
+        // Early.
+        assert!(!takes(sample(3, 12), 11));
         assert!(takes(sample(3, 12), 12));
     }
 }

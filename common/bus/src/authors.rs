@@ -286,13 +286,16 @@ mod tests {
         let writers = Writers::of(1);
         let mut admitted = Admitted::of(&SPEC, Some(&writers));
         let mut admits = |author| admitted.admits(author).unwrap();
-        assert!(!admits(author(7, 1)), "no author is named");
+        // No author is named.
+        assert!(!admits(author(7, 1)));
         writers.name([("stage".to_owned(), author(7, 1))]);
         assert!(admits(author(7, 1)));
-        assert!(!admits(author(66, u32::MAX)), "a forged generation");
+        // A forged generation.
+        assert!(!admits(author(66, u32::MAX)));
         assert!(admits(author(7, 1)));
         writers.name([("stage".to_owned(), author(8, 2))]);
-        assert!(admits(author(7, 1)), "its successor has not written yet");
+        // Its successor has not written yet.
+        assert!(admits(author(7, 1)));
         assert!(admits(author(8, 2)));
         assert!(!admits(author(7, 1)));
         assert_eq!(writers.ignored(), Ignored { samples: 1, process: 66 });
@@ -320,7 +323,8 @@ mod tests {
         let mut admitted = Admitted::of(&SPEC, Some(&writers));
         assert!(admitted.hold_samples().unwrap());
         writers.wait_for_names(Duration::ZERO);
-        assert!(!admitted.hold_samples().unwrap(), "no names came in time");
+        // No names came in time.
+        assert!(!admitted.hold_samples().unwrap());
         assert!(admitted.admits(author(66, u32::MAX)).unwrap());
         assert!(!admitted.admits(author(7, 1)).unwrap());
         *come.borrow_mut() = Some(vec![("stage".to_owned(), author(7, 1))]);

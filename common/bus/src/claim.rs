@@ -69,7 +69,7 @@ mod tests {
         for _ in 0..20 {
             for _ in 0..100 {
                 let own = std::process::id();
-                assert_eq!(domain.supervisor().unwrap(), Some(own), "without any file");
+                assert_eq!(domain.supervisor().unwrap(), Some(own));
             }
             claim.forget_askers();
         }

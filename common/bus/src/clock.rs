@@ -151,7 +151,8 @@ mod tests {
     fn wall_time_runs_from_the_epoch_at_its_rate() {
         let clock = MissionClock::Wall { epoch_ns: 1_000, rate: 2.0 };
         assert_eq!(clock.at(9, 1_500), MissionTime(1_000));
-        assert_eq!(clock.at(9, 500), MissionTime(0), "before the epoch");
+        // Before the epoch.
+        assert_eq!(clock.at(9, 500), MissionTime(0));
     }
 
     #[test]

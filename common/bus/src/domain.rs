@@ -316,7 +316,8 @@ mod tests {
             let _ = fs::remove_dir_all(taken);
             fs::write(taken, "").unwrap();
         }
-        assert_eq!(found(), places[0], "the error names it");
+        // The error names it.
+        assert_eq!(found(), places[0]);
     }
 
     #[test]

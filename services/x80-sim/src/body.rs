@@ -180,7 +180,7 @@ mod tests {
     fn roll(body: &mut Body, world: &World, steps: i32) -> f64 {
         let step = |_| {
             let way = body.roll([0.005 * f64::from(steps.signum()); 2], world)[0];
-            assert!(body.clearance >= 0.0, "it went into something");
+            assert!(body.clearance >= 0.0);
             way
         };
         (0..steps.abs()).map(step).sum()
@@ -195,7 +195,8 @@ mod tests {
         assert_eq!(body.contacts, 1);
         roll(&mut body, &world, -40);
         roll(&mut body, &world, 80);
-        assert_eq!(body.contacts, 2, "it came back");
+        // It came back.
+        assert_eq!(body.contacts, 2);
     }
 
     #[test]

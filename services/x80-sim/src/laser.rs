@@ -273,10 +273,14 @@ mod tests {
         // The camera is 0.1 m ahead of the robot's centre; the face is as far ahead of the box's.
         is_near(ahead(1.0, "top_m = 0.05"), 1.0, 0.1);
         is_near(ahead(1.0, "bottom_m = 0.24"), 1.0, 0.1);
-        assert_eq!(ahead(1.0, "top_m = 0.02"), None, "a sill is not touched");
-        assert_eq!(ahead(1.0, "bottom_m = 0.3"), None, "a table top is not touched");
-        assert_eq!(ahead(0.2, "top_m = 0.25"), Some(-1.0), "nearer than 0.3 m it reads nothing");
-        assert_eq!(ahead(3.5, "top_m = 0.25"), None, "too far away");
+        // A sill is not touched.
+        assert_eq!(ahead(1.0, "top_m = 0.02"), None);
+        // A table top is not touched.
+        assert_eq!(ahead(1.0, "bottom_m = 0.3"), None);
+        // Nearer than 0.3 m it reads nothing.
+        assert_eq!(ahead(0.2, "top_m = 0.25"), Some(-1.0));
+        // Too far away.
+        assert_eq!(ahead(3.5, "top_m = 0.25"), None);
     }
 
     #[track_caller]

@@ -297,7 +297,8 @@ mod tests {
             "[[simulation.thing]]\nfrom_s = 1\nshape.box = [{ at = [1, 0], size_m = [1, 1] }]",
         );
         world.advance(2.0, DVec2::new(1.0, 0.0), 0.1);
-        assert_eq!(world.clearance(DVec2::ZERO), f64::INFINITY, "it waits");
+        // It waits.
+        assert_eq!(world.clearance(DVec2::ZERO), f64::INFINITY);
         world.advance(3.0, DVec2::new(0.0, 0.0), 0.1);
         assert_eq!(world.clearance(DVec2::ZERO), 0.5);
     }

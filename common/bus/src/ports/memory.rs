@@ -220,9 +220,11 @@ mod tests {
         }
         let read = std::iter::from_fn(|| early.next_sample().unwrap());
         let numbers: Vec<_> = read.map(|sample| sample.number).collect();
-        assert_eq!((numbers.len(), numbers[0]), (buffer, 2.0), "the oldest are dropped");
+        // The oldest are dropped.
+        assert_eq!((numbers.len(), numbers[0]), (buffer, 2.0));
         let late = bus.reader(&STRUCTS).unwrap().next_slice().unwrap().unwrap();
-        assert_eq!(late.header().number, (buffer + 1) as f64, "a new reader gets the last sample");
+        // A new reader gets the last sample.
+        assert_eq!(late.header().number, (buffer + 1) as f64);
         assert_eq!(
             (late.author().generation, late.header().stamp.sequence),
             (3, buffer as u32 + 1)

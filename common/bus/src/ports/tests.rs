@@ -181,7 +181,8 @@ fn a_place_is_used_only_if_the_one_behind_it_has_memory() {
     assert_eq!([0, 1, 2, 3, 1].map(is_usable), [true, true, true, false, true]);
     assert_eq!(file.metadata().unwrap().blocks() * 512, 4 * page as u64);
     file.set_len(8 * page as u64).unwrap();
-    assert!(is_usable(3), "memory was freed");
+    // Memory was freed.
+    assert!(is_usable(3));
 }
 
 #[test]

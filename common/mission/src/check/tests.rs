@@ -40,7 +40,8 @@ fn a_zone_is_a_polygon_without_the_start_and_the_targets() {
     let triangle = zone("[[1, 1], [2, 1], [2, 2]]");
     let mission = read_back(&triangle);
     assert_eq!(mission.zones.len(), 1);
-    assert!(mission.obstacles().is_empty(), "it stands nowhere");
+    // It stands nowhere.
+    assert!(mission.obstacles().is_empty());
     assert_refused([
         (zone("[[1, 1], [2, 1]]"), "m.toml:2: zone: a zone has 2 corners"),
         (zone("[[-1, -1], [1, -1], [0, 1]]"), "m.toml:2: zone: the robot starts in a zone"),
@@ -124,7 +125,8 @@ fn a_car_has_the_presets_of_its_model_and_what_the_mission_overrides() {
     );
     let car = mission.body().ackermann().unwrap();
     assert!((car.least_turning_radius() - 0.3).abs() < 1e-12);
-    assert_eq!(mission.body().steering.unwrap().counts_per_turn, 3600.0, "the preset's");
+    // The preset's.
+    assert_eq!(mission.body().steering.unwrap().counts_per_turn, 3600.0);
 }
 
 #[test]

@@ -206,10 +206,12 @@ mod tests {
         let mut lines = Lines::default();
         let whole = br#"{"ranges":{"front":1.2},"heard":1}"#;
         assert_eq!(lines.push(whole), [whole]);
-        assert!(lines.push(b"\n").is_empty(), "its newline comes late");
+        // Its newline comes late.
+        assert!(lines.push(b"\n").is_empty());
         let (first, rest) = whole.split_at(23);
         assert!(first.ends_with(b"}"));
-        assert!(lines.push(first).is_empty(), "a long line is divided over datagrams");
+        // A long line is divided over datagrams.
+        assert!(lines.push(first).is_empty());
         assert_eq!(lines.push(rest), [whole]);
     }
 

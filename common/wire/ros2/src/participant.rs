@@ -482,7 +482,8 @@ mod tests {
             |readers: &Readers, client, after| readers.hears(client, Instant::now() + after);
         assert!(!hears(&readers, client, SETTLED));
         readers.on_matched(reader, false);
-        assert!(!readers.hears(client, Instant::now()), "a heartbeat may follow the report");
+        // A heartbeat may follow the report.
+        assert!(!readers.hears(client, Instant::now()));
         assert!(hears(&readers, client, SETTLED) && !hears(&readers, other, SETTLED));
         readers.on_matched(reader, true);
         assert!(!hears(&readers, client, SETTLED));

@@ -62,7 +62,8 @@ fn delay_and_jitter_keep_the_order_and_a_reordered_datagram_comes_behind_the_nex
     let mut order: Vec<u8> = reordered.iter().map(|(_, bytes)| bytes[0]).collect();
     assert!(order.windows(2).filter(|pair| pair[0] > pair[1]).count() > 10);
     order.sort_unstable();
-    assert!(arrived.len() == 100 && order.into_iter().eq(0..100), "none is lost");
+    // None is lost.
+    assert!(arrived.len() == 100 && order.into_iter().eq(0..100));
 }
 
 #[test]

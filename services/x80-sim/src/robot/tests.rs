@@ -185,14 +185,16 @@ fn a_silent_host_stops_the_motors_only_where_the_mission_says_so() {
         robot.advance_to(3.0);
         robot.motors[1].speed
     };
-    assert!(speed("") > 499.0, "it keeps going");
+    // It keeps going.
+    assert!(speed("") > 499.0);
     assert_eq!(speed("[simulation]\nstops_when_silent_s = 1.5"), 0.0);
 }
 
 #[test]
 fn enabling_and_a_speed_reach_their_channel() {
     let mut robot = robot("");
-    assert!(!robot.motors[5].enabled, "it boots suspended");
+    // It boots suspended.
+    assert!(!robot.motors[5].enabled);
     send(&mut robot, Command::Enable { on: true, channel: None });
     assert!(robot.motors[5].enabled);
     let other = Motion {
@@ -201,7 +203,8 @@ fn enabling_and_a_speed_reach_their_channel() {
         limit_ms: None,
     };
     send(&mut robot, Command::Motion(other));
-    assert_eq!(after(&mut robot, 1).v, 0.0, "channel 4 drives no wheel");
+    // Channel 4 drives no wheel.
+    assert_eq!(after(&mut robot, 1).v, 0.0);
 }
 
 #[test]
@@ -328,7 +331,8 @@ fn a_robot_left_driving_comes_to_rest_and_its_next_process_goes_on_there_with_it
     assert!(stands.x > driving.x + 0.05, "it rolled on: {stands:?}");
     assert_eq!(stands.v, 0.0);
     let later = after(&mut next, 1);
-    assert_eq!((later.x, later.y), (stands.x, stands.y), "it stands");
+    // It stands.
+    assert_eq!((later.x, later.y), (stands.x, stands.y));
     assert!(later.time_s > driving.time_s && later.tick > driving.tick);
     // Restarted counts would show zero.
     let rolled = counts_between(driving.left_counts, later.left_counts);
@@ -356,8 +360,10 @@ fn a_robot_that_speaks_lines_of_json_says_that_its_wheels_are_held_before_a_wall
     // 16 rad/s are 0.56 m/s.
     let said = kobuki("world.wall = [{ points = [[1, -2], [1, 2]] }]", [16.0; 2]);
     let held = |tick: usize| said[tick].held;
-    assert!((1..8).all(|tick| held(tick) == Some([false; 2])), "it rolls");
-    assert_eq!(held(19), Some([true; 2]), "it stands before the wall");
+    // It rolls.
+    assert!((1..8).all(|tick| held(tick) == Some([false; 2])));
+    // It stands before the wall.
+    assert_eq!(held(19), Some([true; 2]));
 }
 
 #[test]

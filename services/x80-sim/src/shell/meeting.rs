@@ -294,7 +294,8 @@ mod tests {
     fn in_lockstep_a_place_of_a_later_time_waits_until_then_and_one_that_ended_is_not_waited_for() {
         let folder = tempfile::tempdir().unwrap();
         let [mut one, mut two] = pair(folder.path(), true);
-        assert_eq!(two.other_at(0.0).unwrap(), None, "nothing was told");
+        // Nothing was told.
+        assert_eq!(two.other_at(0.0).unwrap(), None);
         assert!(!two.knows(0.0));
         for (time_s, x) in [(0.0, 4.0), (0.1, 3.95)] {
             one.tell(&truth(time_s, x), false);
@@ -305,7 +306,8 @@ mod tests {
         assert!(!two.knows(0.2));
         one.tell(&GroundTruthTick { contacts: 1, ..truth(0.2, 3.9) }, false);
         one.tell(&truth(0.3, 3.8), false);
-        assert_eq!(x_and_speed(two.other_at(0.2).unwrap()), Some((3.9, 0.0)), "it stays there");
+        // It stays there.
+        assert_eq!(x_and_speed(two.other_at(0.2).unwrap()), Some((3.9, 0.0)));
         two.other_at(9.0).unwrap();
         assert!(two.knows(9.0));
     }

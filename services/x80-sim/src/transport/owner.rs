@@ -81,6 +81,7 @@ mod tests {
         drop(socket);
         own.senders[0].1 -= 2 * ASKED_AGAIN;
         assert!(own.admits(sender));
-        assert!(!OwnUser::default().admits(sender), "it had no owner");
+        // It had no owner.
+        assert!(!OwnUser::default().admits(sender));
     }
 }

@@ -31,7 +31,8 @@ fn at_max_each_motion_command_moves_time_by_one_period_and_nothing_else_does() {
     let [ack, first] = exchange(&host, &encoded(PING));
     assert_eq!(reports(&ack), [ACK]);
     let [_, again] = exchange(&host, &encoded(PING));
-    assert_eq!(first, again, "a ping changes nothing");
+    // A ping changes nothing.
+    assert_eq!(first, again);
 
     for tick in 1..=20_u64 {
         let [ack, frames] = exchange(&host, &forward(500, 250));
@@ -40,7 +41,8 @@ fn at_max_each_motion_command_moves_time_by_one_period_and_nothing_else_does() {
         assert_eq!(ground_truth.tick, tick);
         assert!((ground_truth.time_s - tick as f64 / 7.0).abs() < 1e-9);
         let [_, current] = exchange(&host, &encoded(PING));
-        assert_eq!(frames, current, "a ping shows the tick once more");
+        // A ping shows the tick once more.
+        assert_eq!(frames, current);
     }
     sim.finish();
 }
@@ -89,7 +91,7 @@ fn one_of_another_host_is_ignored_until_the_first_is_silent() {
     second.send(&ping).unwrap();
     while second.recv(&mut [0; 512]).is_err() {
         second.send(&ping).unwrap();
-        assert!(began.elapsed() < PATIENCE, "never served");
+        assert!(began.elapsed() < PATIENCE);
     }
     assert!(began.elapsed().as_secs_f64() > 1.0, "{:?}", began.elapsed());
 }

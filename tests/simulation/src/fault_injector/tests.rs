@@ -146,15 +146,18 @@ fn frames_are_late_old_or_rare_as_the_table_says() {
     old.set(Some(OldFrames));
     let passed = old.report(&tick([40, 200], 90), at(4.0));
     let told = [&passed[..1], &passed[1..]].map(counts);
-    assert_eq!(told, [Some([40, 200]), Some([10, 200])], "one of 3 s ago, too");
-    assert_eq!(old.report(&tick([41, 200], 90), at(4.1)).len(), 1, "the next one comes in 2 s");
+    // One of 3 s ago, too.
+    assert_eq!(told, [Some([40, 200]), Some([10, 200])]);
+    // The next one comes in 2 s.
+    assert_eq!(old.report(&tick([41, 200], 90), at(4.1)).len(), 1);
 
     let mut slow = x80(FramesSlow, 1);
     let came = (0..30).filter(|&number| {
         let passed = slow.report(&tick([number, 200], 90), at(1.1 + 0.1 * f64::from(number)));
         counts(&passed).is_some()
     });
-    assert!((7..=9).contains(&came.count()), "in 3 s");
+    // In 3 s.
+    assert!((7..=9).contains(&came.count()));
 
     let mut ranges = x80(RangeLate, 1);
     let age_s = ranges.drawn(RANGE_LATE_S);
