@@ -155,13 +155,8 @@ impl Scenario {
         machine: &Rc<SimulatedMachine>,
         heard: &Rc<RefCell<Hearer>>,
     ) -> Option<Finished> {
-        match Robot::start(&self.shoved(), self.pace) {
-            Ok(robot) => machine.place(robot),
-            Err(error) => {
-                machine.break_off("the robot starts", error.to_string());
-                return None;
-            }
-        }
+        let robot = Robot::start(&self.shoved(), self.pace);
+        machine.place(machine.or_break_off("the robot starts", robot)?);
         // Each target has its own timeout.
         let is_target =
             |it: &&Disturbance| matches!(it.what, What::Ask(Request::Goto(_) | Request::Append(_)));
@@ -191,27 +186,15 @@ impl Scenario {
             }
             if machine.supervisor_is_killed() {
                 machine.pass(draw::a_while(&mut random, 0.1));
-                recovered = match RecoveredRun::load(&directory) {
-                    Ok(run) => Some(run),
-                    Err(error) => {
-                        machine.break_off("a killed run can be resumed", error.to_string());
-                        return None;
-                    }
-                };
+                let run = RecoveredRun::load(&directory);
+                recovered = Some(machine.or_break_off("a killed run can be resumed", run)?);
                 continue;
             }
-            return match conducted {
-                Ok(finished) => {
-                    machine.check_end(&self.mission, &finished);
-                    // Whatever has ended, the robot comes to rest.
-                    machine.pass(AFTERWARDS);
-                    Some(finished)
-                }
-                Err(error) => {
-                    machine.break_off("a run ends with its result", error.to_string());
-                    None
-                }
-            };
+            let finished = machine.or_break_off("a run ends with its result", conducted)?;
+            machine.check_end(&self.mission, &finished);
+            // Whatever has ended, the robot comes to rest.
+            machine.pass(AFTERWARDS);
+            return Some(finished);
         }
     }
 

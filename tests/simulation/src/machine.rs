@@ -365,32 +365,40 @@ impl SimulatedMachine {
     fn with_robot(&self, act: impl FnOnce(&mut InMemory) -> Result<(), SimError>) {
         let mut robot = self.robot.borrow_mut();
         let Some(robot) = &mut *robot else { return };
-        if let Err(error) = act(&mut robot.simulated) {
-            self.break_off("the robot runs", error.to_string());
-        }
+        self.or_break_off("the robot runs", act(&mut robot.simulated));
         robot.observe();
         let mut wires = self.wires.borrow_mut();
+        let lane = wires.lane(Way::ToHost);
         for (to, datagram) in robot.simulated.sent() {
             let to = to.port();
             let Some(faults) = &self.faults else {
-                wires.send(Way::ToHost, to, &datagram, self.now_ns.get());
+                lane.send(to, &datagram, self.now_ns.get());
                 continue;
             };
             for late in faults.borrow_mut().report(&datagram, self.now()) {
-                wires.send(Way::ToHost, to, &late.bytes, BEGIN_NS + late.at.as_nanos() as u64);
+                lane.send(to, &late.bytes, BEGIN_NS + late.at.as_nanos() as u64);
             }
         }
     }
 
     pub(crate) fn send_to_robot(&self, from: Port, bytes: &[u8]) {
         self.invariants.borrow_mut().on_sent(bytes, self.now());
-        self.wires.borrow_mut().send(Way::ToRobot, from, bytes, self.now_ns.get());
+        self.wires.borrow_mut().lane(Way::ToRobot).send(from, bytes, self.now_ns.get());
     }
 
     fn judge(&self, checked: Checked) {
         if let Err((invariant, detail)) = checked {
             self.break_off(invariant, detail);
         }
+    }
+
+    /// Returns what an invariant wants, or breaks off without it.
+    pub(crate) fn or_break_off<T>(
+        &self,
+        invariant: &'static str,
+        result: Result<T, impl ToString>,
+    ) -> Option<T> {
+        result.map_err(|error| self.break_off(invariant, error.to_string())).ok()
     }
 
     /// Ends the simulation: the supervisor fails whatever it does next.
@@ -515,7 +523,7 @@ impl SimulatedMachine {
             Hang(stage) => {
                 self.with(stage, |process| process.spins_since_ns = Some(self.now_ns.get()));
             }
-            Wire(way, quality) => self.wires.borrow_mut().set_quality(*way, *quality),
+            Wire(way, quality) => self.wires.borrow_mut().lane(*way).quality = *quality,
             Ask(request) => self.ask(*request),
             // Nobody hears either while there is no bus.
             Break(stage, kind) => {

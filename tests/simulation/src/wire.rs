@@ -41,8 +41,8 @@ struct Datagram {
 
 /// Datagrams of one direction.
 #[derive(Debug, Default)]
-struct Lane {
-    quality: Quality,
+pub(crate) struct Lane {
+    pub quality: Quality,
     /// Arrival of the last datagram that kept its order.
     in_order_ns: u64,
     under_way: VecDeque<Datagram>,
@@ -55,7 +55,7 @@ const LEAST_NS: u64 = 100_000;
 const LATE: Duration = Duration::from_millis(150);
 
 impl Lane {
-    fn send(&mut self, port: Port, bytes: &[u8], now_ns: u64) {
+    pub(crate) fn send(&mut self, port: Port, bytes: &[u8], now_ns: u64) {
         let Quality { lost, doubled, reordered, delay } = self.quality;
         if lost > 0.0 && self.random.chance(lost) {
             return;
@@ -95,16 +95,8 @@ impl Wires {
         Self { lanes: [1, 2].map(lane), ..Self::default() }
     }
 
-    fn lane(&mut self, way: Way) -> &mut Lane {
+    pub(crate) fn lane(&mut self, way: Way) -> &mut Lane {
         &mut self.lanes[way as usize]
-    }
-
-    pub(crate) fn set_quality(&mut self, way: Way, quality: Quality) {
-        self.lane(way).quality = quality;
-    }
-
-    pub(crate) fn send(&mut self, way: Way, port: Port, bytes: &[u8], now_ns: u64) {
-        self.lane(way).send(port, bytes, now_ns);
     }
 
     pub(crate) fn next_ns(&self, way: Way) -> Option<u64> {
