@@ -280,6 +280,7 @@ pub fn wrap_angle(angle: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::close;
 
     #[test]
     fn clearance_is_to_the_surface_and_negative_inside() {
@@ -287,15 +288,16 @@ mod tests {
             wall = [{ points = [[-1, -3], [-1, 3]] }]\n\
             box = [{ at = [0, 4], size_m = [2, 1], angle_deg = 90 }]";
         let shapes: Shapes = toml::from_str(text).unwrap();
-        for (x, y, clearance, what) in [
-            (0.0, 0.0, 1.0, "the wall is nearest"),
-            (1.0, 0.0, 0.5, "the drum is"),
-            (2.0, 0.0, -0.5, "in the drum"),
-            (0.0, 2.5, 0.5, "the turned box is 2 m tall"),
-            (0.0, 4.0, -0.5, "inside the box"),
+        for (x, y, clearance) in [
+            // The wall is nearest, then the drum, at last from within.
+            (0.0, 0.0, 1.0),
+            (1.0, 0.0, 0.5),
+            (2.0, 0.0, -0.5),
+            // The turned box is 2 m tall.
+            (0.0, 2.5, 0.5),
+            (0.0, 4.0, -0.5),
         ] {
-            let found = shapes.clearance(DVec2::new(x, y));
-            assert!((found - clearance).abs() < 1e-12, "{what}: {found}");
+            close(shapes.clearance(DVec2::new(x, y)), clearance);
         }
         assert_eq!(Shapes::default().clearance(DVec2::ZERO), f64::INFINITY);
     }

@@ -211,6 +211,7 @@ impl ModelledSpeed {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::{close, mission};
 
     #[test]
     fn a_robot_stops_from_the_speed_that_is_allowed_within_the_room_that_there_is() {
@@ -240,7 +241,7 @@ mod tests {
     fn a_base_of_which_nobody_stated_how_it_answers_is_trusted_little_and_an_x80_with_what_it_does()
     {
         let trusted = |text: &str| {
-            let mission = crate::testing::mission(text);
+            let mission = mission(text);
             let Response { delay_s, acceleration_m_s2, .. } = mission.trusted_response();
             (mission.states_response(), delay_s, acceleration_m_s2)
         };
@@ -258,12 +259,12 @@ mod tests {
         speed.go_on(0.0);
         speed.command(0.0, 0.3);
         assert_eq!((speed.go_on(0.4), speed.speed()), (0.0, 0.0));
-        assert!((speed.go_on(0.8) - 0.04).abs() < 1e-12 && (speed.speed() - 0.2).abs() < 1e-12);
+        close(speed.go_on(0.8), 0.04);
+        close(speed.speed(), 0.2);
         speed.command(0.8, -0.3);
         // It reaches 0.3 at 1.0 s, keeps it until 1.2 s, and is 0 at 1.8 s.
-        let way = speed.go_on(1.8);
-        assert!((way - (0.05 + 0.06 + 0.09)).abs() < 1e-12, "{way}");
-        assert!(speed.speed().abs() < 1e-12);
+        close(speed.go_on(1.8), 0.05 + 0.06 + 0.09);
+        close(speed.speed(), 0.0);
         let mut at_once = ModelledSpeed::new(0.0, f64::INFINITY);
         at_once.go_on(1.0);
         at_once.command(1.0, 0.5);

@@ -390,7 +390,7 @@ pub(crate) fn x80(radius_m: f64, sonar: &SonarConfig) -> Vec<SensorRow> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{laser, mission, read_back};
+    use crate::testing::{close, laser, mission, read_back};
 
     fn used(extra: &str) -> Vec<String> {
         let table = mission(extra).sensor_table();
@@ -409,7 +409,7 @@ mod tests {
             let table = mission(sonar).sensor_table();
             for (row, (channel, bearing_deg)) in channels.into_iter().zip(bearings).enumerate() {
                 assert_eq!(table[row].channel, channel);
-                assert!((table[row].bearing_deg() - bearing_deg).abs() < 1e-9);
+                close(table[row].bearing_deg(), bearing_deg);
             }
         }
     }

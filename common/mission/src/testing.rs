@@ -1,4 +1,4 @@
-//! Missions of tests.
+//! Missions and comparisons of tests.
 
 use std::path::Path;
 
@@ -34,6 +34,11 @@ pub(crate) fn assert_refused<T: AsRef<str>, const N: usize>(cases: [(T, &str); N
         let refusal = parse(text).expect_err(text).to_string();
         assert!(refusal.contains(words), "{text:?} gave {refusal:?}");
     }
+}
+
+#[track_caller]
+pub(crate) fn close(got: f64, want: f64) {
+    assert!((got - want).abs() < 1e-12, "got {got}, want {want}");
 }
 
 /// Returns the row of a laser with further keys.

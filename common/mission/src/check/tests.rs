@@ -1,5 +1,5 @@
 use super::*;
-use crate::testing::{assert_refused, mission, parse, read_back};
+use crate::testing::{assert_refused, close, mission, parse, read_back};
 
 #[test]
 fn a_target_is_all_a_mission_needs() {
@@ -124,7 +124,7 @@ fn a_car_has_the_presets_of_its_model_and_what_the_mission_overrides() {
         "method = 'paper'\n[robot]\nmodel = 'car'\nsteering_limit_deg = 45\nwheelbase_m = 0.3",
     );
     let car = mission.body().ackermann().unwrap();
-    assert!((car.least_turning_radius() - 0.3).abs() < 1e-12);
+    close(car.least_turning_radius(), 0.3);
     // The preset's.
     assert_eq!(mission.body().steering.unwrap().counts_per_turn, 3600.0);
 }
@@ -156,7 +156,8 @@ fn a_footprint_makes_the_radius_that_covers_it_and_a_radius_alone_makes_a_disc()
     let body = |robot: &str| mission(&format!("[robot]\n{robot}")).body();
     let long = "[robot]\nfootprint = [[-0.3, -0.1], [0.4, -0.1], [0.4, 0.1], [-0.3, 0.1]]";
     let covered = mission(long).body();
-    assert!((covered.radius_m - 0.4_f64.hypot(0.1)).abs() < 1e-12 && covered.footprint.is_some());
+    close(covered.radius_m, 0.4_f64.hypot(0.1));
+    assert!(covered.footprint.is_some());
     for model in ["jackal", "turtlebot3-waffle"] {
         let preset = body(&format!("model = '{model}'"));
         assert!(preset.footprint.unwrap().circumscribed_m() <= preset.radius_m, "{model}");

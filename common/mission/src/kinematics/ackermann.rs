@@ -53,6 +53,7 @@ impl Ackermann {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::close;
     use std::f64::consts::FRAC_PI_4;
 
     fn car(steering_limit: f64) -> Ackermann {
@@ -63,10 +64,6 @@ mod tests {
             top_wheel_speed: 10.0,
             creep: 0.05,
         }
-    }
-
-    fn close(got: f64, want: f64) {
-        assert!((got - want).abs() < 1e-12, "got {got}, want {want}");
     }
 
     fn twists() -> impl Iterator<Item = Twist> {

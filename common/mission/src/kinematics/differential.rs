@@ -37,6 +37,7 @@ impl DifferentialDrive {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::close;
 
     #[test]
     fn equation_2_by_hand_and_its_inverse_which_keeps_the_curvature_at_the_wheels_limit() {
@@ -44,10 +45,10 @@ mod tests {
         for (limit, wheels) in [(100.0, [1.0, 3.0]), (1.5, [0.5, 1.5])] {
             let drive = DifferentialDrive { radius: 0.1, track: 0.4, top_wheel_speed: limit };
             let Twist { v, omega } = drive.twist([1.0, 3.0]);
-            assert!((v - 0.2).abs() < 1e-12 && (omega - 0.5).abs() < 1e-12, "{v} {omega}");
+            close(v, 0.2);
+            close(omega, 0.5);
             let got = drive.wheels(Twist { v, omega });
-            let off = [0, 1].map(|wheel| (got[wheel] - wheels[wheel]).abs());
-            assert!(off[0] < 1e-12 && off[1] < 1e-12, "limit {limit}: {got:?}");
+            [0, 1].map(|wheel| close(got[wheel], wheels[wheel]));
         }
     }
 }

@@ -90,7 +90,7 @@ fn half_a_pulse_width_stands_a_full_one_is_top_speed_and_8000_about_the_half_mov
         [(16_383, 0.0), (16_384 - 8000, 0.0), (16_383 + 8000, 0.0), (32_767, 2000.0), (0, -2000.0)]
     {
         motor.order(Pwm, width, None);
-        assert!((run(&mut motor, 0.0, 0.1)[19] - speed).abs() < 1e-6, "{width}");
+        near(run(&mut motor, 0.0, 0.1)[19], speed, 1e-6);
     }
     motor.order(Pwm, 16_384 + 8100, None);
     assert!(run(&mut motor, 0.0, 0.1)[19] > 0.0);

@@ -49,7 +49,7 @@ fn an_aged_range_lags_a_turn_by_age_times_turn_rate() {
         let range = f64::from(truth.sonar_cm) / 100.0;
         truth.heading.to_degrees() - (1.5 / (range + forward_m)).acos().to_degrees()
     };
-    assert!(lag_deg(0.0).abs() < 0.5, "{}", lag_deg(0.0));
+    near(lag_deg(0.0), 0.0, 0.5);
     // The robot turns for 0.07 s at 1.4 rad/s.
     near(lag_deg(0.07), 5.6, 0.5);
     // Ranges are at most a tick old.
