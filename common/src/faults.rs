@@ -90,28 +90,16 @@ pub fn admit(
 mod tests {
     use super::*;
 
-    fn request(kind: FaultKind, although_real: bool) -> FaultSample {
-        FaultSample {
-            kind: kind.into(),
-            although_real: although_real.into(),
-            ..FaultSample::default()
-        }
-    }
-
     #[test]
-    fn a_fault_in_a_real_robot_needs_a_request_that_says_so() {
-        let unspecific = request(FaultKind::Saddle, false);
+    fn a_fault_in_a_real_robot_needs_a_request_that_says_so_and_a_stage_has_those_of_no_other() {
+        let unspecific = FaultSample { kind: FaultKind::Saddle.into(), ..FaultSample::default() };
         assert_eq!(admit(&unspecific, "planner", false), Err(FaultAnswer::Refused));
         assert_eq!(admit(&unspecific, "planner", true), Ok(FaultKind::Saddle));
-        let meant = request(FaultKind::Saddle, true);
+        let meant = FaultSample { although_real: 1, ..unspecific };
         assert_eq!(admit(&meant, "planner", false), Ok(FaultKind::Saddle));
-    }
-
-    #[test]
-    fn a_stage_has_neither_the_faults_of_others_nor_unknown_ones() {
-        let request = request(FaultKind::Saddle, true);
-        assert_eq!(admit(&request, "mapper", true), Err(FaultAnswer::Impossible));
-        let unknown = FaultSample { kind: 200, ..request };
+        // A stage has neither the faults of others nor unknown ones.
+        assert_eq!(admit(&meant, "mapper", true), Err(FaultAnswer::Impossible));
+        let unknown = FaultSample { kind: 200, ..meant };
         assert_eq!(admit(&unknown, "planner", true), Err(FaultAnswer::Impossible));
     }
 

@@ -286,7 +286,7 @@ impl SimulatedMachine {
             (disturbs, Event::Disturbance),
             (wires.next_ns(Way::ToRobot), Event::ToRobot),
             (wires.next_ns(Way::ToHost), Event::ToHost),
-            (self.robot.borrow().as_ref().and_then(Robot::next_ns), Event::Robot),
+            (self.robot.borrow().as_ref().and_then(|it| it.simulated.next_due_ns()), Event::Robot),
             (self.guard.borrow().due_ns, Event::Guard),
         ];
         let processes = self.processes.borrow();

@@ -18,8 +18,4 @@ impl Robot {
     pub(crate) fn observe(&mut self) {
         self.truth.extend(self.simulated.truth());
     }
-
-    pub(crate) fn next_ns(&self) -> Option<u64> {
-        self.simulated.next_due_ns()
-    }
 }

@@ -93,6 +93,7 @@ pub(crate) fn pow2(n: i32) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::LOG10_2;
 
     #[test]
     fn a_scaled_number_keeps_its_value_beyond_the_range_of_f64() {
@@ -100,9 +101,7 @@ mod tests {
             let tiny = Scaled::new(value, -200_000);
             assert!((1.0..2.0).contains(&tiny.mantissa));
             assert_eq!(tiny.exponent, Scaled::new(value, 0).exponent - 200_000);
-            assert!(
-                (tiny.log10() + 200_000.0 * std::f64::consts::LOG10_2 - value.log10()).abs() < 1e-6
-            );
+            assert!((tiny.log10() + 200_000.0 * LOG10_2 - value.log10()).abs() < 1e-6);
         }
     }
 
@@ -116,12 +115,8 @@ mod tests {
     }
 
     #[test]
-    fn zero_stays_zero_whatever_it_is_taken_relative_to() {
+    fn order_follows_the_exponent_before_the_mantissa_and_zero_stays_the_least() {
         assert_eq!(Scaled::ZERO.relative_to(-200_000), 0.0);
-    }
-
-    #[test]
-    fn order_follows_the_exponent_before_the_mantissa() {
         let [low, high, higher] = [(1.9, -5000), (1.25, 7), (1.5, 7)]
             .map(|(mantissa, exponent)| Scaled { mantissa, exponent });
         assert!(Scaled::ZERO < low && low < high && high < higher);
