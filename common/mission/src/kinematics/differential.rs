@@ -48,7 +48,7 @@ mod tests {
             close(v, 0.2);
             close(omega, 0.5);
             let got = drive.wheels(Twist { v, omega });
-            [0, 1].map(|wheel| close(got[wheel], wheels[wheel]));
+            (0..2).for_each(|wheel| close(got[wheel], wheels[wheel]));
         }
     }
 }
