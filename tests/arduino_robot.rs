@@ -27,7 +27,7 @@ fn arrives_after_a_kill(mut robot: Robot, mut run: Run, loses_robot: bool) {
 fn a_robot_with_an_arduino_that_restarts_with_each_connection_arrives_though_its_link_is_killed() {
     let mission = format!("{GUIDE}robot.toml");
     let robot = Robot::start(&mission, "tcp", "127.0.0.1:0");
-    let run = Run::at_own_speed("arduino-tcp", &mission, &["--set", &robot.as_robot()]);
+    let run = Run::at_own_speed("arduino-tcp", &mission, &robot.as_robot());
     arrives_after_a_kill(robot, run, true);
 }
 
@@ -41,6 +41,6 @@ fn an_arduino_and_an_rplidar_on_a_serial_line_each_arrive_though_the_link_is_kil
     let (protocol, model) = ("protocol = \"arduino\"\n", "model = \"rplidar-a1\"\n");
     let real = text.replace(protocol, &(base + protocol)).replace(model, &(laser + model));
     let (_directory, mission) = mission_file(&real);
-    let run = Run::start("rplidar-pty", &mission, &[]);
+    let run = Run::start("rplidar-pty", &mission, "");
     arrives_after_a_kill(robot, run, false);
 }

@@ -61,8 +61,8 @@ fn status_names_the_trouble_of_a_stage_that_cannot_start() {
     let nowhere = format!("{model}\naddress = \"tcp://no-such-host.invalid:1\"");
     let (_directory, mission) = mission_file(&text.replace(model, &nowhere));
     let silent = UdpSocket::bind("127.0.0.1:0").unwrap();
-    let address = format!("robot.address='udp://{}'", silent.local_addr().unwrap());
-    let run = Run::start("no-host", &mission, &["--set", &address]);
+    let address = format!("--set robot.address='udp://{}'", silent.local_addr().unwrap());
+    let run = Run::start("no-host", &mission, &address);
     let named = |status: &serde_json::Value| {
         status["complaint"].to_string().contains("no-such-host.invalid")
     };
@@ -121,7 +121,7 @@ fn what_is_not_there_or_cannot_be_is_named_with_what_there_is() {
 
 #[test]
 fn a_second_supervisor_or_stage_of_a_robot_is_refused_and_the_first_goes_on() {
-    let first = Run::under_way("second", "obstacle-course", &["--pace", "1"], 0.3);
+    let first = Run::under_way("second", "obstacle-course", "--pace 1", 0.3);
     let runs = tempfile::tempdir().unwrap();
     let runs = runs.path().to_str().unwrap();
     let pid = first.pid().to_string();
@@ -135,7 +135,7 @@ fn a_second_supervisor_or_stage_of_a_robot_is_refused_and_the_first_goes_on() {
 
 #[test]
 fn results_of_an_earlier_run_are_not_overwritten_and_a_run_that_ended_is_not_resumed() {
-    let (_, directory) = Run::start("bi-again", "open-room", &["--no-record"]).arrives_in();
+    let (_, directory) = Run::start("bi-again", "open-room", "--no-record").arrives_in();
     let out = directory.path().join("run");
     assert!(!out.join("report").exists());
     let out = out.to_str().unwrap();

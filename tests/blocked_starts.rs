@@ -17,7 +17,7 @@ use common::{
 use rustix::process::Signal;
 use serde_json::Value;
 
-const PACE: [&str; 2] = ["--pace", "4"];
+const PACE: &str = "--pace 4";
 
 fn process_of(number: u128) -> u32 {
     (number >> 64) as u32
@@ -54,7 +54,7 @@ fn assert_arrives(run: Run) -> Value {
 
 #[test]
 fn what_a_killed_stage_left_half_made_blocks_no_start_and_is_removed() {
-    let slow = [&PACE[..], &["--set", "controller.speed_m_s=0.1"]].concat();
+    let slow = format!("{PACE} --set controller.speed_m_s=0.1");
     let mut run = Run::start("block-own", "open-room", &slow);
     let status = run.wait_until_under_way(1.0);
     let bus = bus_instance("block-own");
@@ -96,7 +96,7 @@ fn what_a_killed_stage_left_half_made_blocks_no_start_and_is_removed() {
 
 #[test]
 fn a_connection_half_made_by_an_unknown_process_blocks_one_start_at_most() {
-    let mut run = Run::start("block-other", "open-room", &PACE);
+    let mut run = Run::start("block-other", "open-room", PACE);
     let status = run.wait_until_under_way(1.0);
     let bus = bus_instance("block-other");
     // By its tags the port belongs to the mapper, but its id has another process number.
@@ -119,7 +119,7 @@ fn a_connection_half_made_by_an_unknown_process_blocks_one_start_at_most() {
 #[test]
 fn places_in_a_topic_that_are_never_given_back_block_starts_until_the_bus_is_recreated() {
     in_own_process(|| {
-        let mut run = Run::start("block-places", "open-room", &PACE);
+        let mut run = Run::start("block-places", "open-room", PACE);
         let status = run.wait_until_under_way(1.0);
         let joined = Bus::join(&bus_instance("block-places").domain, "greedy").unwrap();
         let mut places = Vec::new();

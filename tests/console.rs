@@ -68,8 +68,8 @@ fn printed(arguments: &[&str]) -> String {
 fn every_topic_is_echoed_and_counted_and_a_closed_standard_output_makes_no_command_fail() {
     let robot = "con-echo";
     // The robot arrives only after all output.
-    let slow = ["--pace", "2", "--set", "controller.speed_m_s=0.02"];
-    let run = Run::under_way(robot, "open-room", &slow, 0.2);
+    let slow = "--pace 2 --set controller.speed_m_s=0.02";
+    let run = Run::under_way(robot, "open-room", slow, 0.2);
     let of_robot = |line: &str| printed(&words(&format!("{line} --robot {robot}")));
     echo_prints_every_topic(robot, of_robot);
     hz_counts_every_topic(robot, of_robot);
@@ -184,14 +184,14 @@ fn echo_and_logs_follow_their_robot_from_run_to_run_and_logs_come_from_every_pro
     let mut waits = String::new();
     echo.said.read_line(&mut waits).unwrap();
     assert!(waits.contains(robot), "{waits}");
-    let arguments = ["--pace", "8"];
-    let first = Run::start(robot, "open-room", &arguments);
+    let arguments = "--pace 8";
+    let first = Run::start(robot, "open-room", arguments);
     let mut tick = || echo.json()["stamp"]["tick"].as_u64().unwrap();
     while !logs.line().contains("all stages ready") {}
     while tick() < 10 {}
     first.signal(Signal::TERM);
     let (_, _, directory) = first.finish_in();
-    let second = Run::start(robot, "open-room", &arguments);
+    let second = Run::start(robot, "open-room", arguments);
     while !logs.line().contains("all stages ready") {}
     while tick() >= 10 {}
     signal_process(echo.child.id(), Signal::TERM);
@@ -216,7 +216,7 @@ fn echo_and_logs_follow_their_robot_from_run_to_run_and_logs_come_from_every_pro
 #[test]
 fn robots_that_run_are_listed_with_their_place_and_do_not_see_each_other() {
     let [one, two] = ["con-list-1", "con-list-2"];
-    let mut runs = [one, two].map(|robot| Run::start(robot, "open-room", &ENDLESS));
+    let mut runs = [one, two].map(|robot| Run::start(robot, "open-room", ENDLESS));
     runs.iter_mut().for_each(|run| drop(run.wait_until_under_way(0.5)));
     let listed = |robot: &str| {
         let robots = json_lines(&printed(&["status", "--all", "--json"]));
@@ -241,7 +241,7 @@ fn robots_that_run_are_listed_with_their_place_and_do_not_see_each_other() {
     assert_said(&output(&["status", "--all"]), &[one]);
     assert_no_restart(&ended.stop());
     assert_eq!(listed(two), None);
-    let (code, _) = run(one, "open-room", &["--timeout", "1"]);
+    let (code, _) = run(one, "open-room", "--timeout 1");
     assert_eq!(code, Some(4));
     assert_nothing_left(one);
 }

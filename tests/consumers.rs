@@ -57,7 +57,7 @@ fn a_logger_follows_its_robot_through_three_runs_one_of_them_killed_and_harms_no
         thread::scope(|scope| {
             scope.spawn(|| follow("followed", 3, heard));
             for run in 0..3 {
-                let mut started = Run::at_own_speed("followed", "open-room", &["--pace", "4"]);
+                let mut started = Run::at_own_speed("followed", "open-room", "--pace 4");
                 if run == 1 {
                     let has_heard = || heard.lock().unwrap().get(1).is_some_and(|&poses| poses > 5);
                     started.wait_until("the logger hears it", |_| has_heard());
@@ -83,8 +83,8 @@ fn a_logger_follows_its_robot_through_three_runs_one_of_them_killed_and_harms_no
 fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_notices() {
     in_own_process(|| {
         // The robot arrives only after its stages run again, on a busy machine too.
-        let slowly = ["--pace", "2", "--set", "controller.speed_m_s=0.02"];
-        let mut run = Run::under_way("greedy", "open-room", &slowly, 0.5);
+        let slowly = "--pace 2 --set controller.speed_m_s=0.02";
+        let mut run = Run::under_way("greedy", "open-room", slowly, 0.5);
         let bus = Bus::join(&domain("greedy"), "greedy").unwrap();
         let mut grids = bus.reader(&topics::GRID).unwrap();
         let mut held = Vec::new();
@@ -154,8 +154,8 @@ fn join_again_and_again(robot: &str, over: &AtomicBool) -> usize {
 fn consumers_that_stay_and_that_join_again_and_again_take_no_stages_place() {
     in_own_process(|| {
         let robot = "visited-c6";
-        let slowly = ["--pace", "2", "--set", "controller.speed_m_s=0.05"];
-        let mut run = Run::under_way(robot, "obstacle-course", &slowly, 0.5);
+        let slowly = "--pace 2 --set controller.speed_m_s=0.05";
+        let mut run = Run::under_way(robot, "obstacle-course", slowly, 0.5);
         let mut staying = Vec::new();
         for consumer in 0..10 {
             let topic = ["grid", "field"][consumer % 2];

@@ -113,7 +113,7 @@ fn listen(decoder: &mut Decoder, at: Instant, tell: &Sender<Heard>) {
 fn tapped(robot: &str) -> (Robot, Tap, Run) {
     let body = Robot::on_the_course();
     let tap = Tap::before(&body);
-    let run = Run::start(robot, "obstacle-course", &["--set", &tap.proxy.as_robot()]);
+    let run = Run::start(robot, "obstacle-course", &tap.proxy.as_robot());
     (body, tap, run)
 }
 
@@ -179,5 +179,5 @@ fn a_run_that_a_signal_ends_or_kills_leaves_the_command_zero_and_no_process() {
         tap.assert_last_is_zero();
     }
     // The files of the killed run do not hinder the next run, and are removed with it.
-    Run::start("tap-end", "open-room", &[]).arrives();
+    Run::start("tap-end", "open-room", "").arrives();
 }

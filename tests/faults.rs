@@ -5,8 +5,8 @@ use crate::support::{Run, STAGES, all_run, find, generation, operate, printed, r
 #[test]
 fn a_stage_that_spins_or_beats_and_answers_nothing_is_replaced_and_nobody_behind_it() {
     let robot = "mutes";
-    let slow = ["--pace", "4", "--set", "controller.speed_m_s=0.02", "--timeout", "2000"];
-    let mut run = Run::under_way(robot, "open-room", &slow, 1.0);
+    let slow = "--pace 4 --set controller.speed_m_s=0.02 --timeout 2000";
+    let mut run = Run::under_way(robot, "open-room", slow, 1.0);
     // The link owes no answer to other stages' outputs.
     let mutes = STAGES.into_iter().skip(1).map(|stage| (stage, "mute"));
     for (stage, fault) in mutes.chain([("controller", "spin")]) {
@@ -33,8 +33,8 @@ fn a_stage_that_spins_or_beats_and_answers_nothing_is_replaced_and_nobody_behind
 #[test]
 fn a_real_robot_is_not_broken_unless_it_is_meant() {
     // An address makes the robot a real one. It never moves, because the address is unused.
-    let address = ["--set", "robot.address=\"127.0.0.1:9\"", "--pace", "1"];
-    let mut run = Run::start("metal", "open-room", &address);
+    let address = "--set robot.address='127.0.0.1:9' --pace 1";
+    let mut run = Run::start("metal", "open-room", address);
     run.wait_until("its stages run", |status| find(status, "planner")["state"] == "running");
     let fault = ["stage", "fault", "planner", "saddle", "--robot", "metal"];
     refused(&fault, "real-robot", &["--break-a-real-robot"]);

@@ -11,17 +11,12 @@ use crate::support::{Run, firsthand, recording_in, replayed};
 fn by_fixes_and_a_gyro_unequal_wheels_arrive_though_dead_reckoning_is_killed_between_them() {
     let robot = "fix-killed";
     // A right wheel 1 % larger than the left leads 0.7 m past the target after 6 m.
-    let keys = [
-        "simulation.realism='laboratory'",
-        "controller.speed_m_s=0.4",
-        "simulation.wheels.diameter_ratio=1.01",
-        "robot.odometry.diameter_ratio_sd=0.005",
-        "robot.odometry.track_scale_sd=0.015",
-        "sure_within_m=0.5",
-    ];
+    let keys = "--set simulation.realism='laboratory' --set controller.speed_m_s=0.4 \
+                --set simulation.wheels.diameter_ratio=1.01 \
+                --set robot.odometry.diameter_ratio_sd=0.005 \
+                --set robot.odometry.track_scale_sd=0.015 --set sure_within_m=0.5";
     // A source must not stall for 2 s of mission time while a loaded machine replaces a stage.
-    let arguments = [&["--pace", "2"], &keys.map(|key| ["--set", key]).concat()[..]].concat();
-    let mut run = Run::start(robot, "obstacle-course", &arguments);
+    let mut run = Run::start(robot, "obstacle-course", &format!("--pace 2 {keys}"));
     let mut sources = firsthand(&["bench", "sources", "--robot", robot])
         .arg(run.directory())
         // Some fixes are off by a metre.

@@ -10,9 +10,9 @@ use rustix::process::Signal;
 #[test]
 fn a_robot_follows_the_pose_of_another_robot_until_that_ends_and_replays_to_the_bit() {
     let (first, second) = ("follow-first", "follow-second");
-    let mission = ["--stay", "--pace", "2"];
-    let mut leads = Run::start(first, "open-room", &mission);
-    let mut follows = Run::start(second, "open-room", &mission);
+    let mission = "--stay --pace 2";
+    let mut leads = Run::start(first, "open-room", mission);
+    let mut follows = Run::start(second, "open-room", mission);
     leads.wait_until_driving();
     follows.wait_until_driving();
     for (leader, distance, code) in

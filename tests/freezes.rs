@@ -13,7 +13,7 @@ const SLACK: f64 = 0.020;
 /// Freezes each stage `times` times in a mission at wall-clock pace, and prints the delay of each
 /// detection.
 fn freeze_each(robot: &str, times: usize) -> Vec<f64> {
-    let mut run = Run::under_way(robot, "open-room", &ENDLESS, 0.5);
+    let mut run = Run::under_way(robot, "open-room", ENDLESS, 0.5);
     for _ in 0..times {
         run.kill_each(Signal::STOP);
     }

@@ -9,8 +9,6 @@ use crate::support::{
     refused, replayed_poses, wait_until, words,
 };
 
-const PACE: [&str; 2] = ["--pace", "2"];
-
 #[test]
 fn a_target_is_refused_with_the_reason_and_the_robot_keeps_the_one_it_has() {
     let robot = "goto-refused";
@@ -18,10 +16,10 @@ fn a_target_is_refused_with_the_reason_and_the_robot_keeps_the_one_it_has() {
         refused(&words(&format!("goto --robot {robot} {line}")), code, names);
     };
     to("1 1", "not-running", &[robot]);
-    let known = ["--set", "known.drum=[{at=[2.0, 2.0], radius_m=0.3}]"];
     // It arrives only when it returns, on a starved machine too.
-    let slow = ["--set", "controller.speed_m_s=0.005", "--set", "timeout_s=2000"];
-    let mut run = Run::under_way(robot, "open-room", &[&PACE[..], &known, &slow].concat(), 1.0);
+    let slow = "--pace 2 --set known.drum=[{at=[2.0,2.0],radius_m=0.3}] \
+                --set controller.speed_m_s=0.005 --set timeout_s=2000";
+    let mut run = Run::under_way(robot, "open-room", slow, 1.0);
     to("1", "usage", &[]);
     to("1 1 2", "no-target", &["2"]);
     to("inf 1", "no-target", &[robot]);
@@ -82,7 +80,7 @@ points = [[-2.2, -0.4], [-3.0, -0.4], [-3.0, 0.4], [-2.2, 0.4], [-2.2, -0.4]]
 fn a_robot_that_stays_takes_targets_zones_and_its_place_until_it_is_ended_and_replays_to_the_bit() {
     let robot = "goto-stay";
     let (_directory, mission) = mission_file(STAYS);
-    let mut run = Run::start(robot, &mission, &["--pace", "4"]);
+    let mut run = Run::start(robot, &mission, "--pace 4");
     let say = |line: &str, code: &str| {
         refused(&words(&format!("{line} --robot {robot}")), code, &[]);
     };

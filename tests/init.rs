@@ -42,7 +42,7 @@ fn a_silent_address_a_foreign_protocol_and_a_robot_that_is_driven_are_refused_wi
         assert!(!out.exists());
     };
     init(&at, "no-answer", &["nothing answers", &at]);
-    let run = Run::under_way("init-used", "open-room", &ENDLESS, 0.3);
+    let run = Run::under_way("init-used", "open-room", ENDLESS, 0.3);
     let address = common::run::Run::load(&run.directory()).unwrap().address.to_string();
     init(&address, "address-in-use", &["init-used"]);
     run.stop();

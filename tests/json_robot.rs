@@ -33,12 +33,10 @@ impl PythonRobot {
         Self { process, last, port: first["port"].as_u64().unwrap() }
     }
 
-    fn run(&self, robot: &str, set: &[&str]) -> Run {
-        let address = format!("robot.address='udp://127.0.0.1:{}'", self.port);
-        let fast = "controller.speed_m_s=0.5";
-        let near = "target=[3, 0]";
-        let set = [&["--set", &address, "--set", fast, "--set", near], set].concat();
-        Run::start(robot, &format!("{EXAMPLE}/robot.toml"), &set)
+    fn run(&self, robot: &str, more: &str) -> Run {
+        let address = format!("--set robot.address='udp://127.0.0.1:{}'", self.port);
+        let near = "--set controller.speed_m_s=0.5 --set target=[3,0]";
+        Run::start(robot, &format!("{EXAMPLE}/robot.toml"), &format!("{address} {near} {more}"))
     }
 
     /// Ends the robot. Returns its last line about itself.
@@ -51,7 +49,7 @@ impl PythonRobot {
 #[test]
 fn a_robot_in_python_arrives_untouched_though_each_stage_is_killed() {
     let robot = PythonRobot::start();
-    let mut run = robot.run("json-kills", &[]);
+    let mut run = robot.run("json-kills", "");
     run.wait_until_under_way(0.3);
     run.kill_each(Signal::KILL);
     run.arrives();
@@ -65,8 +63,8 @@ fn a_robot_in_python_arrives_untouched_though_each_stage_is_killed() {
 #[test]
 fn a_run_whose_robot_names_a_sensor_otherwise_ends_with_both_names_and_blames_no_stage() {
     let robot = PythonRobot::start();
-    let nose = "robot.sensor=[{name='nose',kind='cone',forward_m=0.2,bearing_deg=0}]";
-    let summary = robot.run("json-nose", &["--set", nose]).ends(6, "aborted");
+    let nose = "--set robot.sensor=[{name='nose',kind='cone',forward_m=0.2,bearing_deg=0}]";
+    let summary = robot.run("json-nose", nose).ends(6, "aborted");
     let reason = summary["reason"].as_str().unwrap();
     assert!(
         reason

@@ -16,7 +16,7 @@ use crate::support::{
 };
 
 /// Options for mission time at four times the wall clock: a mission takes ten seconds.
-const FAST: &[&str] = &["--pace", "4"];
+const FAST: &str = "--pace 4";
 
 /// Returns each stage with SIGKILL or SIGSTOP in turn.
 fn kill_and_freeze_in_turn() -> impl Iterator<Item = (&'static str, Signal)> {
@@ -52,7 +52,7 @@ fn each_stage_killed_or_frozen_in_its_start_up_is_started_again_and_the_robot_ar
 #[test]
 fn each_stage_killed_and_frozen_while_driving_the_robot_arrives_and_every_generation_replays_to_the_bit()
  {
-    let slow = [FAST, &["--set", "controller.speed_m_s=0.1"]].concat();
+    let slow = format!("{FAST} --set controller.speed_m_s=0.1");
     let mut run = Run::under_way("kf-drive", "obstacle-course", &slow, 1.0);
     run.kill_each(Signal::KILL);
     run.kill_each(Signal::STOP);
@@ -72,8 +72,8 @@ fn each_stage_killed_and_frozen_while_driving_the_robot_arrives_and_every_genera
 
 #[test]
 fn a_mission_in_lockstep_does_not_hang_when_each_stage_is_killed_or_frozen() {
-    let slow = ["--set", "controller.speed_m_s=0.012", "--timeout", "40000"];
-    let mut run = Run::under_way("kf-lockstep", "open-room", &slow, 1.0);
+    let slow = "--set controller.speed_m_s=0.012 --timeout 40000";
+    let mut run = Run::under_way("kf-lockstep", "open-room", slow, 1.0);
     for (stage, signal) in kill_and_freeze_in_turn() {
         run.kill_and_await_successor(stage, signal);
     }
@@ -94,7 +94,7 @@ fn all_stages_killed_or_frozen_while_the_run_stops_it_ends_in_order() {
 
 #[test]
 fn a_frozen_stage_that_is_thawed_in_time_goes_on() {
-    let mut run = Run::under_way("kf-thaw", "open-room", &ENDLESS, 0.5);
+    let mut run = Run::under_way("kf-thaw", "open-room", ENDLESS, 0.5);
     let beats = |status: &Value| {
         let controller = find(status, "controller");
         controller["state"] == "running" && controller["beat_age_s"].as_f64() < Some(0.1)

@@ -8,15 +8,15 @@ use crate::support::{Run, STAGES, printed, recording_in, replayed};
 fn a_robot_with_two_lasers_arrives_though_each_stage_is_killed_and_replays_to_the_bit() {
     let lasers = [("front", 0), ("back", 180)].map(|(name, bearing_deg)| {
         format!(
-            "{{name='{name}', kind='scan', forward_m=0.1, bearing_deg={bearing_deg}, \
-             field_of_view_deg=180, beams=91}}"
+            "{{name='{name}',kind='scan',forward_m=0.1,bearing_deg={bearing_deg},\
+             field_of_view_deg=180,beams=91}}"
         )
     });
-    let sensors = format!("robot.sensor=[{}]", lasers.join(","));
+    let lasers = format!("--set robot.sensor=[{}]", lasers.join(","));
     // The robot arrives only after the last kill.
-    let keys = ["robot.model='kobuki'", "robot.rate_hz=20", "controller.speed_m_s=0.35", &*sensors];
-    let arguments = [&["--pace", "1"], &keys.map(|key| ["--set", key]).concat()[..]].concat();
-    let mut run = Run::under_way("laser-kills", "obstacle-course", &arguments, 0.3);
+    let slow = "--pace 1 --set controller.speed_m_s=0.35";
+    let line = format!("{slow} --set robot.model='kobuki' --set robot.rate_hz=20 {lasers}");
+    let mut run = Run::under_way("laser-kills", "obstacle-course", &line, 0.3);
     for topic in ["scan", "scan_fix"] {
         printed(&["topic", "echo", topic, "--robot", "laser-kills", "-n", "1"]);
     }

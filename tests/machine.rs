@@ -12,7 +12,7 @@ use crate::support::{
     ENDLESS, Run, STAGES, all_run, assert_no_restart, assert_nothing_left, assert_refused,
     assert_said, directory_of, domain, find, firsthand, firsthand_under, generation, on_small_disk,
     on_small_shared_memory, pid, reached, records, refused, signal_process, start_piped,
-    wait_for_status, wait_until,
+    wait_for_status, wait_until, words,
 };
 use rustix::process::Signal;
 use serde_json::Value;
@@ -23,7 +23,7 @@ fn descriptors(process: u32) -> usize {
 
 #[test]
 fn stages_are_not_taken_for_hung_when_the_supervisor_stood_still_with_them() {
-    let mut run = Run::start("mach-still", "open-room", &ENDLESS);
+    let mut run = Run::start("mach-still", "open-room", ENDLESS);
     let status = run.wait_until_under_way(0.5);
     let stages = STAGES.map(|stage| pid(&status, stage));
     for _ in 0..4 {
@@ -53,9 +53,9 @@ fn a_full_disk_ends_no_mission_and_loses_no_result() {
         let robot = "mach-full";
         let out = disk.path().join("run");
         // The robot arrives only after the second look at its stages.
-        let slow = ["--pace", "2", "--set", "controller.speed_m_s=0.25"];
+        let slow = "--pace 2 --set controller.speed_m_s=0.25";
         let mut run = firsthand(&["run", "obstacle-course", "--robot", robot, "--json"]);
-        run.args(slow).args(["--set", "sure_within_m=9", "--out"]).arg(&out);
+        run.args(words(slow)).args(["--set", "sure_within_m=9", "--out"]).arg(&out);
         let run = start_piped(run.stderr(Stdio::piped()));
         wait_for_status(robot, |status| status["mission_time_s"].as_f64() > Some(1.0));
         disk.fill();
@@ -105,7 +105,7 @@ fn shared_memory_that_is_full_is_refused_at_the_start_and_harms_no_run_later() {
         let run = ["run", "open-room", "--robot", robot, "--runs", runs.path().to_str().unwrap()];
         refused(&run, "shared-memory", &["--shm-size", "firsthand doctor"]);
         memory.empty();
-        let run = Run::under_way(robot, "obstacle-course", &["--pace", "4"], 0.3);
+        let run = Run::under_way(robot, "obstacle-course", "--pace 4", 0.3);
         memory.fill();
         assert_no_restart(&run.arrives());
     });
@@ -117,7 +117,7 @@ fn a_supervisor_waits_for_one_that_was_killed_a_moment_ago() {
     fs::create_dir_all(domain.directory()).unwrap();
     let held = File::create(domain.lock_file()).unwrap();
     held.lock().unwrap();
-    let run = Run::at_own_speed("mach-gone", "open-room", &[]);
+    let run = Run::at_own_speed("mach-gone", "open-room", "");
     // The supervisor logs before it locks, and retries for a second.
     wait_until("it logs", || run.directory().join("supervisor.log").exists());
     thread::sleep(Duration::from_millis(100));

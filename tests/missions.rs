@@ -7,7 +7,7 @@ use crate::support::{self, ENDLESS, Run, assert_nothing_left, json_lines, printe
 #[test]
 fn latency_is_measured_beside_hops_at_each_rate_and_leaves_nothing_but_what_was_there() {
     // Another robot of this user, with its directory below the removed one.
-    let run = Run::under_way("hops-beside", "open-room", &ENDLESS, 0.3);
+    let run = Run::under_way("hops-beside", "open-room", ENDLESS, 0.3);
     let measured = |robot: &str, more: &str| {
         let short = "bench tick --rounds 1 --set timeout_s=5 --json";
         json_lines(&printed(&words(&format!("{short} --robot {robot} {more}"))))

@@ -43,8 +43,8 @@ const ENDS_WITHIN: Duration = Duration::from_secs(20);
 fn a_second_controller_or_supervisor_and_samples_that_seem_newer_are_ignored_and_told() {
     in_own_process(|| {
         let robot = "forged";
-        let slow = ["--pace", "4", "--set", "controller.speed_m_s=0.1"];
-        let run = Run::under_way(robot, "open-room", &slow, 0.3);
+        let slow = "--pace 4 --set controller.speed_m_s=0.1";
+        let run = Run::under_way(robot, "open-room", slow, 0.3);
         let mut echo = firsthand(&["topic", "echo", "pose", "--robot", robot, "--json"]);
         let echo = start_piped(echo.args(["--number", "40"]));
         let printed = echo.stdout.as_ref().unwrap();
@@ -167,7 +167,7 @@ fn files_and_datagrams_of_another_user_neither_block_nor_drive_a_run() {
         fs::write(planted, "").unwrap();
         fs::set_permissions(planted, fs::Permissions::from_mode(0o666)).unwrap();
         std::os::unix::fs::chown(planted, Some(65534), Some(65534)).unwrap();
-        let run = Run::under_way("driven", "open-room", &["--pace", "4"], 0.3);
+        let run = Run::under_way("driven", "open-room", "--pace 4", 0.3);
         let robot = common::run::Run::load(&run.directory()).unwrap().address;
         let Address::Udp(robot) = robot else { panic!("{robot}") };
         // The thread ends with the process of this test.
@@ -209,7 +209,7 @@ fn a_signal_goes_to_who_holds_the_supervisors_lock_and_not_to_the_number_in_its_
 
 /// Runs into damage. Asserts that the run ends soon after SIGTERM, and that the next one arrives.
 fn ends_after(robot: &str, damage: impl Fn(&[PathBuf])) {
-    let mut run = Run::start(robot, "open-room", &["--pace", "1"]);
+    let mut run = Run::start(robot, "open-room", "--pace 1");
     let status = run.wait_until_under_way(0.3);
     damage(&shared_memory(&domain(robot).shared_memory_prefix()));
     // A stage that joins finds these files.
@@ -221,7 +221,7 @@ fn ends_after(robot: &str, damage: impl Fn(&[PathBuf])) {
     let began = Instant::now();
     run.reap();
     assert!(began.elapsed() < ENDS_WITHIN, "{robot}: {:?}", began.elapsed());
-    Run::start(robot, "open-room", &[]).arrives();
+    Run::start(robot, "open-room", "").arrives();
 }
 
 #[test]

@@ -4,7 +4,7 @@ use crate::support::{Run, find, operate};
 
 #[test]
 fn a_stage_that_dies_again_and_again_is_held_until_an_operator_releases_it() {
-    let mut run = Run::under_way("held", "open-room", &["--pace", "4"], 1.0);
+    let mut run = Run::under_way("held", "open-room", "--pace 4", 1.0);
     // The next generation fails at its start.
     let checkpoint = run.directory().join("mapper.checkpoint");
     std::fs::remove_file(&checkpoint).unwrap();

@@ -77,7 +77,7 @@ fn a_robot_is_watched_stopped_and_resumed_on_a_phone_that_loses_and_regains_its_
     browser.go(&page.drive);
     browser.wait_for("status", "no robot runs");
     assert_eq!(browser.run("return location.hash"), "", "the token is not shown");
-    let mut run = Run::start(robot, "open-room", &ENDLESS);
+    let mut run = Run::start(robot, "open-room", ENDLESS);
     run.wait_until_driving();
     browser.wait_until(GOES);
     browser.wait_until("document.querySelectorAll('#stages tr').length === 6");
@@ -161,7 +161,7 @@ fn actions_and_answers_are_in_view_at_every_size_without_scrolling() {
         return not_run("the page at four sizes", "chromium and chromedriver are missing");
     }
     let robot = "page-sizes";
-    let mut run = Run::start(robot, "open-room", &ENDLESS);
+    let mut run = Run::start(robot, "open-room", ENDLESS);
     run.wait_until_driving();
     let page = Page::start(robot, "127.0.0.1:0");
     let browser = Browser::open(1400);
@@ -202,7 +202,7 @@ fn a_recorded_run_is_scrubbed_played_and_printed_with_what_moved_in_windows_of_b
     if !has_browser() {
         return not_run("a recorded page", "chromium and chromedriver are missing");
     }
-    let (_, directory) = Run::at_own_speed("page-movers", "walkers", &[]).arrives_in();
+    let (_, directory) = Run::at_own_speed("page-movers", "walkers", "").arrives_in();
     let page = directory.path().join("run/report/report.html");
     let out = tempfile::tempdir().unwrap();
     let golden = golden().path;

@@ -8,14 +8,8 @@ use crate::support::{
 };
 
 /// Drum known beforehand, so the path around it is the same in every run.
-const DRUM: [&str; 6] = [
-    "--set",
-    "known.drum=[{at=[1.8, 0.1], radius_m=0.3}]",
-    "--set",
-    "world.drum=[{at=[1.8, 0.1], radius_m=0.3}]",
-    "--set",
-    "mapper.clearance_m=0.1",
-];
+const DRUM: &str = "--set known.drum=[{at=[1.8,0.1],radius_m=0.3}] \
+    --set world.drum=[{at=[1.8,0.1],radius_m=0.3}] --set mapper.clearance_m=0.1";
 
 /// Makes an executable at `path` that becomes a baseline.
 fn own_planner(path: &Path) {
@@ -27,15 +21,10 @@ fn own_planner(path: &Path) {
     fs::set_permissions(path, fs::Permissions::from_mode(0o755)).unwrap();
 }
 
-fn planner(executable: &str) -> String {
-    format!("planner.executable='{executable}'")
-}
-
 #[test]
 fn a_mission_with_a_planner_of_its_own_arrives_though_the_planner_is_killed_on_the_way() {
-    let set = planner("wavefront");
-    let arguments = [&DRUM[..], &["--pace", "4", "--set", &set]].concat();
-    let mut run = Run::start("wavefront", "open-room", &arguments);
+    let line = format!("{DRUM} --pace 4 --set planner.executable='wavefront'");
+    let mut run = Run::start("wavefront", "open-room", &line);
     // At 0.25 m/s the robot is then on its way around the drum.
     let status = run.wait_until_under_way(6.0);
     // The summary counts the restart even if the run ends early.
@@ -52,9 +41,8 @@ fn a_stage_started_by_another_becomes_the_planner_that_the_mission_names() {
     let own = folder.path().join("planner");
     own_planner(&own);
     for (robot, named) in [("own-units", own.to_str().unwrap()), ("base-units", "wavefront")] {
-        let set = planner(named);
-        let arguments = ["--pace", "4", "--watch-only", "--set", &set];
-        let mut run = Run::start(robot, "open-room", &arguments);
+        let line = format!("--pace 4 --watch-only --set planner.executable='{named}'");
+        let mut run = Run::start(robot, "open-room", &line);
         run.wait_until("there is a bus", |status| status["order"] == "starting");
         let stages =
             STAGES.map(|stage| start_quietly(&mut firsthand(&["stage", stage, "--robot", robot])));

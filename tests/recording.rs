@@ -44,7 +44,7 @@ fn a_run_is_recorded_from_its_first_sample_and_every_stage_replays_to_the_bit() 
     let file = out.path().join("waited.mcap");
     let (mut waits, said) = recorder(robot, &file);
     let (code, summary, directory) =
-        Run::at_own_speed(robot, "obstacle-course", &["--pace", "2"]).finish_in();
+        Run::at_own_speed(robot, "obstacle-course", "--pace 2").finish_in();
     assert_reached(code, &summary);
     said.lines().map(Result::unwrap).find(|line| line.contains("complete")).unwrap();
     signal_process(waits.id(), Signal::INT);
@@ -102,8 +102,8 @@ fn a_run_is_recorded_from_its_first_sample_and_every_stage_replays_to_the_bit() 
 fn every_order_that_was_answered_is_recorded_and_a_run_that_is_ended_waits_for_its_recorder() {
     let robot = "rec-orders";
     // These commands take long on a busy machine, and the robot must arrive later.
-    let slow = ["--pace", "1", "--set", "controller.speed_m_s=0.006"];
-    let mut run = Run::start(robot, "open-room", &slow);
+    let slow = "--pace 1 --set controller.speed_m_s=0.006";
+    let mut run = Run::start(robot, "open-room", slow);
     run.wait_until_driving();
     let mut asked = Vec::new();
     for _ in 0..4 {
@@ -147,7 +147,7 @@ fn every_order_that_was_answered_is_recorded_and_a_run_that_is_ended_waits_for_i
 
 #[test]
 fn a_run_in_lockstep_waits_for_its_recorder_and_its_log_time_is_mission_time() {
-    let run = Run::start("rec-late", "open-room", &["--timeout", "8"]);
+    let run = Run::start("rec-late", "open-room", "--timeout 8");
     let file = run.directory().join("recording.mcap");
     wait_until("the recorder has begun its file", || file.exists());
     let recorder = process_with("rec-late", "firsthand record").unwrap();
@@ -194,7 +194,7 @@ fn kill_recorder(robot: &str, file: &Path, growths: usize) {
 
 #[test]
 fn recorders_killed_leave_readable_files_that_say_so_and_the_mission_as_it_was() {
-    let run = Run::under_way("rec-shot", "open-room", &["--pace", "1"], 0.5);
+    let run = Run::under_way("rec-shot", "open-room", "--pace 1", 0.5);
     // A standing robot cannot arrive before its recorders are killed.
     operate("rec-shot", "stop");
     let directory = tempfile::tempdir().unwrap();
@@ -219,9 +219,8 @@ fn recorders_killed_leave_readable_files_that_say_so_and_the_mission_as_it_was()
 fn a_disk_budget_ends_files_at_a_quarter_of_it_removes_the_oldest_and_each_can_be_read_alone() {
     // The run is long enough for eight files. The budget allows one that exceeds its share by a
     // chunk.
-    let slow = "controller.speed_m_s=0.15";
-    let budget = ["--pace", "4", "--disk-budget", "1500kB", "--set", slow];
-    let (_, directory) = Run::start("rec-budget", "obstacle-course", &budget).arrives_in();
+    let budget = "--pace 4 --disk-budget 1500kB --set controller.speed_m_s=0.15";
+    let (_, directory) = Run::start("rec-budget", "obstacle-course", budget).arrives_in();
     let run = directory.path().join("run");
     let files = recording::parts(&run);
     let size = |file: &PathBuf| fs::metadata(file).unwrap().len();

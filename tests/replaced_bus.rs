@@ -30,7 +30,7 @@ fn next_pose(bus: &Bus) -> PoseSample {
 #[test]
 fn a_consumer_of_a_bus_that_was_replaced_joins_again_and_leaves_the_old_one_without_harm() {
     in_own_process(|| {
-        let mut run = Run::start(ROBOT, "open-room", &ENDLESS);
+        let mut run = Run::start(ROBOT, "open-room", ENDLESS);
         let status = run.wait_until_under_way(1.0);
         let domain = domain(ROBOT);
         let old = Bus::join(&domain, "logger").unwrap();

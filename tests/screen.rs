@@ -119,8 +119,8 @@ fn top_does_what_its_keys_say_ends_with_its_terminal_and_on_a_signal_and_the_mis
     let mut screen = Screen::start(robot);
     screen.wait_for("is not running here");
     // The robot stands while the other keys are pressed, so it cannot arrive earlier.
-    let slow = ["--pace", "2", "--timeout", "600", "--set", "controller.speed_m_s=0.2"];
-    let mut run = Run::start(robot, "obstacle-course", &slow);
+    let slow = "--pace 2 --timeout 600 --set controller.speed_m_s=0.2";
+    let mut run = Run::start(robot, "obstacle-course", slow);
     screen.wait_for("driving");
     screen.wait_for("dead-reckoning");
     screen.wait_for("perimeter");

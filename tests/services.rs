@@ -173,9 +173,8 @@ impl Drop for Units {
     }
 }
 
-fn watching(robot: &'static str, arguments: &[&str]) -> (Run, Units) {
-    let arguments = [&["--watch-only"], arguments].concat();
-    let mut run = Run::start(robot, "obstacle-course", &arguments);
+fn watching(robot: &'static str, line: &str) -> (Run, Units) {
+    let mut run = Run::start(robot, "obstacle-course", &format!("--watch-only {line}"));
     run.wait_until("there is a bus", |status| status["order"] == "starting");
     (run, Units::start(robot))
 }
@@ -184,7 +183,7 @@ fn watching(robot: &'static str, arguments: &[&str]) -> (Run, Units) {
 fn external_stages_survive_kills_and_freezes_and_those_that_systemd_stops_are_no_deaths() {
     let robot = "units";
     // The mission is long enough for several kills on a busy machine.
-    let (mut run, mut units) = watching(robot, &["--pace", "4"]);
+    let (mut run, mut units) = watching(robot, "--pace 4");
     run.wait_until_under_way(1.0);
     run.kill_each(Signal::KILL);
     let status = run.kill_and_await_successor("mapper", Signal::STOP);
@@ -213,8 +212,7 @@ fn external_stages_stop_the_robot_and_end_with_a_killed_supervisor_and_a_frozen_
     let robot = "unit-orphan";
     let body = Robot::on_the_course();
     let tap = Tap::before(&body);
-    let address = tap.proxy.as_robot();
-    let (mut run, mut units) = watching(robot, &["--set", &address]);
+    let (mut run, mut units) = watching(robot, &tap.proxy.as_robot());
     let status = run.wait_until_under_way(1.0);
     // The kernel wakes a stage of the supervisor when its parent ends, but an external one stays
     // frozen.
@@ -223,7 +221,7 @@ fn external_stages_stop_the_robot_and_end_with_a_killed_supervisor_and_a_frozen_
     run.kill();
     units.assert_all_leave();
     tap.assert_last_is_zero();
-    Run::start(robot, "open-room", &[]).arrives();
+    Run::start(robot, "open-room", "").arrives();
     mapper.join().unwrap();
 }
 

@@ -27,7 +27,7 @@ fn mission(target_m: f64) -> (TempDir, String) {
 fn under_way(name: &str, transport: &str) -> (TempDir, Robot, Run) {
     let (directory, mission) = mission(5.0);
     let mut robot = Robot::start(&mission, transport, "127.0.0.1:0");
-    let mut run = Run::start(name, &mission, &["--set", &robot.as_robot()]);
+    let mut run = Run::start(name, &mission, &robot.as_robot());
     run.wait_until_driving();
     robot.wait_until_driven(0.3);
     (directory, robot, run)
@@ -150,7 +150,7 @@ fn a_robot_that_gets_no_stop_has_an_outcome_of_its_own_and_a_guard_that_stops_it
     let (_directory, mission) = mission(0.6);
     let mut robot = Robot::start(&mission, "udp", "127.0.0.1:0");
     let wire = Wire::before(&robot, Fault::NoStop);
-    let mut run = Run::start(name, &mission, &["--set", &wire.proxy.as_robot()]);
+    let mut run = Run::start(name, &mission, &wire.proxy.as_robot());
     let directory = run.directory();
     wait_until("there is a summary", || {
         assert!(run.is_running(), "the run ended while its robot moves");
@@ -182,7 +182,7 @@ fn a_robot_without_usable_motor_frames_is_said_to_be_unknown_and_the_first_signa
     let ends = |robot: &str, before: Fault, fault: Fault| {
         let mut body = Robot::on_the_course();
         let wire = Wire::before(&body, before);
-        let mut run = Run::start(robot, "obstacle-course", &["--set", &wire.proxy.as_robot()]);
+        let mut run = Run::start(robot, "obstacle-course", &wire.proxy.as_robot());
         if before == Fault::None {
             body.wait_until_driven(0.1);
             wire.set(fault);
@@ -283,7 +283,7 @@ fn a_robot_whose_directory_is_removed_again_and_again_is_stopped_resumed_sent_an
 
 #[test]
 fn a_second_ctrl_c_ends_a_run_that_draws_its_picture() {
-    let mut run = Run::under_way("drawing", "open-room", &["--pace", "1"], 0.5);
+    let mut run = Run::under_way("drawing", "open-room", "--pace 1", 0.5);
     // A write into a pipe without a reader blocks forever.
     let picture = run.directory().join("picture.svg");
     assert!(std::process::Command::new("mkfifo").arg(&picture).status().unwrap().success());

@@ -17,7 +17,7 @@ fn goes_away_and_comes_back(transport: &str) {
     let mut robot = Robot::start(&mission, transport, "127.0.0.1:0");
     let listened = robot.listening.clone();
     let name = format!("away-{transport}");
-    let mut run = Run::start(&name, &mission, &["--set", &robot.as_robot()]);
+    let mut run = Run::start(&name, &mission, &robot.as_robot());
     robot.wait_until_driven(0.15);
     let first_part = robot.kill();
     let lost = run.wait_until("the robot is lost and looked for", |status| {

@@ -56,8 +56,8 @@ fn assert_no_file_is_open_to_other_users(robot: &str) {
 #[test]
 fn a_bus_is_wired_as_its_table_says_closed_to_other_users_and_to_other_payloads() {
     in_own_process(|| {
-        let low = ["--pace", "2", "--set", "simulation.battery.start_v=6.4"];
-        let mut run = Run::start("wiring", "obstacle-course", &low);
+        let low = "--pace 2 --set simulation.battery.start_v=6.4";
+        let mut run = Run::start("wiring", "obstacle-course", low);
         let status = run
             .wait_until("the battery is known to be low", |status| status["power"]["low"] == true);
         let volts = status["power"]["motor_v"].as_f64().unwrap();
@@ -83,7 +83,7 @@ fn a_bus_is_wired_as_its_table_says_closed_to_other_users_and_to_other_payloads(
 #[test]
 fn a_robot_of_another_version_is_named_and_can_be_stopped() {
     let robot = "foreign-vers";
-    let run = Run::under_way(robot, "obstacle-course", &["--pace", "1"], 0.3);
+    let run = Run::under_way(robot, "obstacle-course", "--pace 1", 0.3);
     let file = bus_instance(robot).config();
     let config = fs::read_to_string(&file).unwrap();
     fs::write(&file, config.replacen(VERSION, "99.0.0", 1)).unwrap();

@@ -30,8 +30,7 @@ pub const STAGES: [&str; 5] = ["link", "dead-reckoning", "mapper", "planner", "c
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Arguments of a run that outlasts its test on any machine.
-pub const ENDLESS: [&str; 6] =
-    ["--pace", "1", "--set", "controller.speed_m_s=0.002", "--timeout", "80000"];
+pub const ENDLESS: &str = "--pace 1 --set controller.speed_m_s=0.002 --timeout 80000";
 
 /// Calls `is_so` until it returns true, for at most [`PATIENCE`].
 pub fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) {

@@ -15,7 +15,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 use super::{
-    commands::{firsthand, json_lines, start_piped},
+    commands::{firsthand, json_lines, start_piped, words},
     robot::{
         STAGES, all_run, assert_nothing_left, directory_of, follow_status, generation, pid,
         signal_process, status_of,
@@ -38,24 +38,23 @@ impl Run {
     /// Its defaults suit tests. Uncalibrated wheels do not make the arrival unsure. The timeout
     /// allows for slow process starts on a busy machine. The robot is slow, so that a test can act
     /// while it drives.
-    pub fn start(robot: &str, mission: &str, arguments: &[&str]) -> Self {
-        let slow = ["--set", "controller.speed_m_s=0.2"];
-        Self::at_own_speed(robot, mission, &[&slow[..], arguments].concat())
+    pub fn start(robot: &str, mission: &str, line: &str) -> Self {
+        Self::at_own_speed(robot, mission, &format!("--set controller.speed_m_s=0.2 {line}"))
     }
 
     /// Starts like [`Self::start`], at the mission's own speed.
-    pub fn at_own_speed(robot: &str, mission: &str, arguments: &[&str]) -> Self {
+    pub fn at_own_speed(robot: &str, mission: &str, line: &str) -> Self {
         let directory = directory_of(robot);
         let out = directory.path().join("run");
         let mut run = firsthand(&["run", mission, "--robot", robot, "--json", "--out"]);
         run.arg(&out).args(["--set", "sure_within_m=9", "--set", "timeout_s=900"]);
-        let child = Some(start_piped(run.args(arguments).stderr(Stdio::piped())));
+        let child = Some(start_piped(run.args(words(line)).stderr(Stdio::piped())));
         Self { robot: robot.to_owned(), child, directory, keeps_guard: false }
     }
 
     /// Starts, and waits for `seconds` of mission time.
-    pub fn under_way(robot: &str, mission: &str, arguments: &[&str], seconds: f64) -> Self {
-        let mut run = Self::start(robot, mission, arguments);
+    pub fn under_way(robot: &str, mission: &str, line: &str, seconds: f64) -> Self {
+        let mut run = Self::start(robot, mission, line);
         run.wait_until_under_way(seconds);
         run
     }
@@ -252,8 +251,8 @@ pub fn logged(directory: &Path, process: &str, parts: &[&str]) -> usize {
     log.lines().filter(has_all).count()
 }
 
-pub fn run(robot: &str, mission: &str, arguments: &[&str]) -> (Option<i32>, Value) {
-    Run::at_own_speed(robot, mission, arguments).finish()
+pub fn run(robot: &str, mission: &str, line: &str) -> (Option<i32>, Value) {
+    Run::at_own_speed(robot, mission, line).finish()
 }
 
 /// Replays the recording of a run, given the directory above the run's.

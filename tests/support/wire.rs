@@ -41,9 +41,9 @@ impl Robot {
         Self { scheme, ..Self::start_with(mission, &arguments) }
     }
 
-    /// Returns the mission assignment that makes this the robot.
+    /// Returns the arguments that make this the robot of a run.
     pub fn as_robot(&self) -> String {
-        format!("robot.address=\"{}{}\"", self.scheme, self.listening)
+        format!("--set robot.address=\"{}{}\"", self.scheme, self.listening)
     }
 
     /// Starts a simulated robot with further arguments of `firsthand sim`.
@@ -137,9 +137,9 @@ impl Proxy {
         Self { address }
     }
 
-    /// Returns the mission assignment that makes the proxy the robot.
+    /// Returns the arguments that make the proxy the robot of a run.
     pub fn as_robot(&self) -> String {
-        format!("robot.address=\"udp://{}\"", self.address)
+        format!("--set robot.address=\"udp://{}\"", self.address)
     }
 }
 
