@@ -46,19 +46,3 @@ impl RobotTime {
         })
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::testing::at;
-
-    #[test]
-    fn a_stamp_outside_the_kept_ticks_is_as_far_from_them_as_the_robots_clock_says() {
-        let mut time = RobotTime::default();
-        for second in 1..=3_u32 {
-            time.tick(i64::from(second) * 1000, at(2e-6 * f64::from(second)));
-        }
-        let since = [500, 1500, 3500].map(|stamp_ns| time.since_tick_ns(stamp_ns));
-        assert_eq!(since, [-4500, -3000, 500].map(Some));
-    }
-}

@@ -77,12 +77,13 @@ fn a_stamped_scan_is_placed_by_the_clocks_of_ticks_and_by_its_age_alone_once_the
     let (row, laser) = mission.laser().unwrap();
     let mut sensors = Sensors::new(&mission);
     let still = motion(&mission.body(), [0.0; 2], [0.0; 2], [false; 2]);
-    // The second tick comes late, right before the third; the clock is set before the last.
+    // The second tick comes late, right before the third, and the fourth too; a scan is newer than
+    // that, one older than the first. The clock is set before the last.
     for (tick_ms, now_ms, scan_ms, expected_ms) in [
         (70_000, 5_000, 70_000, 0),
         (70_100, 5_180, 70_050, -90),
         (70_200, 5_200, 70_050, -110),
-        (70_300, 5_300, 70_330, 30),
+        (70_300, 5_330, 70_330, 30),
         (70_400, 5_400, 69_990, -410),
         (10, 5_500, 70_390, -30),
     ] {
