@@ -6,15 +6,10 @@ use super::*;
 
 /// Returns two sonars at 10 Hz: a round takes at most three polls, and a request is lost after 20.
 fn mission(set: &str) -> Mission {
-    let row = |name: &str, channel: u8, bearing: i32| {
-        format!(
-            "[[robot.sensor]]\nname = '{name}'\nkind = 'cone'\nchannel = {channel}\nforward_m = 0.1\nbearing_deg = {bearing}\n"
-        )
-    };
     let text = format!(
-        "target = [3, 0]\nrobot.protocol = 'arduino'\nrobot.counts_per_turn = 1200\nrobot.rate_hz = 10\nrobot.arduino.sonars = {{ front = 4, left = 5 }}\n{set}\n{}{}",
-        row("front", 1, 0),
-        row("left", 0, 40)
+        "target = [3, 0]\nrobot.protocol = 'arduino'\nrobot.counts_per_turn = 1200\nrobot.rate_hz = 10\nrobot.arduino.sonars = {{ front = 4, left = 5 }}\n{set}\n\
+        [[robot.sensor]]\nname = 'front'\nkind = 'cone'\nchannel = 1\nforward_m = 0.1\nbearing_deg = 0\n\
+        [[robot.sensor]]\nname = 'left'\nkind = 'cone'\nchannel = 0\nforward_m = 0.1\nbearing_deg = 40\n"
     );
     Mission::parse(&text, Path::new("m.toml")).unwrap()
 }

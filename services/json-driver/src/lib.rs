@@ -270,14 +270,10 @@ mod tests {
         heard.refused.as_ref().is_some_and(|refused| refused.to_string().contains(why))
     }
 
-    fn laser(name: &str, keys: &str) -> String {
-        format!(
-            "[[robot.sensor]]\nname = '{name}'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\n{keys}\n"
-        )
-    }
-
     fn driver_with_laser(keys: &str) -> Json {
-        driver_of(&format!("robot.protocol = 'json'\n{}", laser("laser", keys)))
+        driver_of(&format!(
+            "robot.protocol = 'json'\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\n{keys}\n"
+        ))
     }
 
     impl Json {
@@ -425,8 +421,11 @@ mod tests {
 
     #[test]
     fn scans_of_several_lasers_are_told_apart_by_the_names_of_their_rows() {
-        let rows = ["front", "back"].map(|name| laser(name, "beams = 3")).concat();
-        let mut driver = driver_of(&format!("robot.protocol = 'json'\n{rows}"));
+        let mut driver = driver_of(
+            "robot.protocol = 'json'\n\
+            [[robot.sensor]]\nname = 'front'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nbeams = 3\n\
+            [[robot.sensor]]\nname = 'back'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nbeams = 3\n",
+        );
         let said =
             r#"{"scans":{"back":{"ranges":[1,2,3],"age_s":0.2},"front":{"ranges":[4,5,6]}}}"#;
         let scans = driver.hears(said).scans;

@@ -530,7 +530,7 @@ mod tests {
         full.surfaces = full.surfaces.iter().copied().cycle().take(MOST_SURFACES).collect();
         full.reindex();
         let saved = postcard::to_allocvec(&held).unwrap();
-        assert!(saved.len() <= Surroundings::MOST_BYTES, "{} bytes", saved.len());
+        assert!(saved.len() <= Surroundings::MOST_BYTES);
         let mut restored: Option<Surroundings> = postcard::from_bytes(&saved).unwrap();
         restored.as_mut().unwrap().reindex();
         assert_eq!(held, restored);

@@ -209,7 +209,7 @@ mod tests {
             let ahead = Advice::along(DVec2::X, 2.0);
             motion.turns_too(moving(0.5, omega), motion.dead_s(), ahead).limit
         };
-        assert!(limit(0.0) > 0.6 && limit(1.0) < 0.51, "{} {}", limit(0.0), limit(1.0));
+        assert!(limit(0.0) > 0.6 && limit(1.0) < 0.51);
         let back = Advice::back(DVec2::X, 0.2);
         assert_eq!(motion.turns_too(moving(0.5, 1.0), 0.1, back), back);
     }

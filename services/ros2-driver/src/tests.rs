@@ -346,17 +346,11 @@ fn the_missions_names_are_those_of_its_topics() {
 
 #[test]
 fn each_of_several_lasers_has_a_topic_of_its_own_and_its_scan_is_that_of_its_row() {
-    let row = |name: &str, turned: u32| {
-        format!(
-            "[[robot.sensor]]\nname = '{name}'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nroll_deg = {turned}\nmodel = 'lds-02'\n"
-        )
-    };
-    let extra = format!(
-        "robot.ros2.ranges = {{ back = '/b', front = '/f' }}\n{}{}",
-        row("front", 0),
-        row("back", 180)
+    let mut driver = driver(
+        "robot.ros2.ranges = { back = '/b', front = '/f' }\n\
+        [[robot.sensor]]\nname = 'front'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nmodel = 'lds-02'\n\
+        [[robot.sensor]]\nname = 'back'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nroll_deg = 180\nmodel = 'lds-02'\n",
     );
-    let mut driver = driver(&extra);
     let ranges = Vec::from_iter((0..360_u16).map(|beam| 1.0 + f32::from(beam) / 100.0));
     let scan = scan_of([-180.0, 1.0], &ranges);
     assert_eq!(names(&driver.topics)[..4], ["rt/odom", "rt/f", "rt/b", "rt/battery_state"]);

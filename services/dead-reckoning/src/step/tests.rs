@@ -119,9 +119,9 @@ fn a_way_longer_than_the_cycle_of_a_counter_is_in_the_pose_of_a_robot_that_has_n
         at(0, 77.0);
         let counts = (way / (0.2e-3 * PI)).round();
         let after = at(10, 77.0 + counts);
-        assert!(!after.rejected && (after.pose.x_m - way).abs() < 0.001, "{}", after.pose.x_m);
+        assert!(!after.rejected && (after.pose.x_m - way).abs() < 0.001, "{after:?}");
         let on = at(11, 78.0 + counts);
-        assert!(!on.rejected && (on.pose.x_m - way).abs() < 0.002, "{}", on.pose.x_m);
+        assert!(!on.rejected && (on.pose.x_m - way).abs() < 0.002, "{on:?}");
         // Wheels cannot turn this far in half a second.
         let jump = at(12, 78.0 + 2.0 * counts + 32_768.0);
         assert!(jump.rejected && jump.pose.covariance[0] > on.pose.covariance[0] + 0.1);

@@ -116,5 +116,5 @@ fn no_history_leaves_a_robot_that_may_move_without_a_process_that_orders_the_sto
             }
         }
     }
-    assert!(newest.is_empty() && seen.len() > 20, "{} states", seen.len());
+    assert!(newest.is_empty() && seen.len() > 20);
 }

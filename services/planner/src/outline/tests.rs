@@ -51,8 +51,6 @@ fn a_long_body_turns_in_the_open_and_not_between_walls() {
     let walls = in_scanned_room(&mission, |at| (at.y.abs() - 0.35).abs() <= INFLATED_M, |_| true);
     let between = walls.view();
     let along = pose(-1.0, 0.0, 0.0);
-    assert!(!outline.touches(&between, &along));
-    assert!(outline.touches(&between, &pose(-1.0, 0.0, 90.0)));
     assert!(outline.turns(&between, &along, 0.1) && !outline.turns(&between, &along, PI));
     let empty = in_scanned_room(&mission, |_| false, |_| true);
     assert!(outline.turns(&empty.view(), &along, PI));

@@ -175,7 +175,7 @@ fn readings_are_published_until_the_wheels_have_rolled_too_far() {
     for tick in 2..200 {
         mapper.hear(0.5 + tick as f64, None);
     }
-    assert!(beams(&mapper).len() < 50, "{}", beams(&mapper).len());
+    assert!(beams(&mapper).len() < 50);
     // A wrong pose may be the cause of a reset.
     mapper.reset(1);
     assert!(beams(&mapper).is_empty());
