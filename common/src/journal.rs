@@ -171,12 +171,13 @@ mod tests {
         Journal::open(path, 64, 4_592).unwrap()
     }
 
-    /// Returns the paths of a snapshot and of its journal.
-    fn files() -> (tempfile::TempDir, PathBuf, PathBuf) {
+    /// Returns the paths of a snapshot and of its journal, and that journal.
+    fn files() -> (tempfile::TempDir, PathBuf, PathBuf, Journal) {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("map.checkpoint");
         let file = path.with_extension("journal");
-        (directory, path, file)
+        let (journal, _) = open(&path);
+        (directory, path, file, journal)
     }
 
     /// Returns the state as a new process restores it.
@@ -187,7 +188,7 @@ mod tests {
 
     #[test]
     fn a_new_process_folds_the_entries_into_the_snapshot() {
-        let (_directory, path, _) = files();
+        let (_directory, path, ..) = files();
         let mut sum = 0;
         for restart in 0..5 {
             let (mut journal, _) = open(&path);
@@ -204,8 +205,7 @@ mod tests {
 
     #[test]
     fn an_append_cut_after_any_byte_or_with_any_bit_changed_loses_that_entry_and_noise_is_none() {
-        let (_directory, path, file) = files();
-        let (mut journal, _) = open(&path);
+        let (_directory, path, file, mut journal) = files();
         journal.append(&100_u64).unwrap();
         let before = fs::read(&file).unwrap().len() - HEADER;
         journal.append(&200_u64).unwrap();
@@ -232,8 +232,8 @@ mod tests {
 
     #[test]
     fn a_whole_entry_of_another_version_or_type_is_refused_and_not_cut_off() {
-        let (_directory, path, file) = files();
-        open(&path).0.append(&100_u64).unwrap();
+        let (_directory, path, file, mut journal) = files();
+        journal.append(&100_u64).unwrap();
         let refused = Journal::open::<Sum, [String; 3]>(&path, 64, 4_592).unwrap_err().to_string();
         assert!(
             refused.contains("map.journal") && refused.contains("cannot be decoded"),
@@ -254,8 +254,7 @@ mod tests {
 
     #[test]
     fn entries_the_snapshot_holds_are_not_folded_twice() {
-        let (_directory, path, file) = files();
-        let (mut journal, _) = open(&path);
+        let (_directory, path, file, mut journal) = files();
         for entry in 1..=4_u64 {
             journal.append(&entry).unwrap();
         }
@@ -270,8 +269,7 @@ mod tests {
 
     #[test]
     fn a_snapshot_is_due_after_so_many_entries_and_not_before() {
-        let (_directory, path, _) = files();
-        let (mut journal, _) = open(&path);
+        let (_directory, .., mut journal) = files();
         for entry in 0..snapshot_after(64) {
             assert!(!journal.is_long(), "after {entry}");
             journal.append(&entry).unwrap();

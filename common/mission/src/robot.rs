@@ -299,20 +299,20 @@ mod tests {
 
     #[test]
     fn every_model_has_a_body_and_no_other_is_preset() {
-        use Model as M;
+        use Model::*;
         let models = [
-            &[M::X80, M::X80sv, M::Jackal][..],
-            &[M::TurtleBot3Burger, M::TurtleBot3Waffle, M::TurtleBot4],
-            &[M::Create3, M::Kobuki, M::TurtleBot2, M::Car],
+            &[X80, X80sv, Jackal][..],
+            &[TurtleBot3Burger, TurtleBot3Waffle, TurtleBot4],
+            &[Create3, Kobuki, TurtleBot2, Car],
         ];
         assert_eq!(MODELS.keys().copied().collect::<Vec<_>>(), models.concat());
         for model in models.concat() {
             let body = RobotConfig { model, ..RobotConfig::default() }.body();
             let sizes = [body.wheel_radius_m, body.track_m, body.radius_m, body.top_speed_m_s];
             assert!(sizes.iter().all(|size| *size > 0.0), "{model:?}: {body:?}");
-            let has_outline = matches!(model, M::Jackal | M::TurtleBot3Waffle);
+            let has_outline = matches!(model, Jackal | TurtleBot3Waffle);
             assert_eq!(body.footprint.is_some(), has_outline, "{model:?}");
-            assert_eq!(body.steering.is_some(), model == M::Car, "{model:?}");
+            assert_eq!(body.steering.is_some(), model == Car, "{model:?}");
         }
     }
 }

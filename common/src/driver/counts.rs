@@ -82,19 +82,20 @@ pub fn wheel_sample(counts: [u16; 2], counts_per_s: [i32; 2]) -> WheelSample {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use WheelCounts::*;
 
     #[test]
     fn endless_counts_have_no_cycle_and_agree_with_cyclic_ones_on_a_short_way() {
         let far = [20_000.0, -70_000.0];
-        let (before, after) = (WheelCounts::Endless([-5.0; 2]), WheelCounts::Endless(far));
+        let (before, after) = (Endless([-5.0; 2]), Endless(far));
         assert_eq!(after.since(before), [20_005.0, -69_995.0]);
-        assert!(!WheelCounts::Endless([32_768.0; 2]).restarted_since(after));
-        assert!(WheelCounts::Endless([3.0, -2.0]).restarted_since(after));
-        let near = WheelCounts::Cyclic([32_760, 10]);
-        assert_eq!(WheelCounts::Endless([2.0, 20.0]).since(near), [10.0, 10.0]);
-        assert_eq!(WheelCounts::Endless([-1e-20, 32_768.5]).cyclic(), [32_767, 0]);
+        assert!(!Endless([32_768.0; 2]).restarted_since(after));
+        assert!(Endless([3.0, -2.0]).restarted_since(after));
+        let near = Cyclic([32_760, 10]);
+        assert_eq!(Endless([2.0, 20.0]).since(near), [10.0, 10.0]);
+        assert_eq!(Endless([-1e-20, 32_768.5]).cyclic(), [32_767, 0]);
         let hostile = CountsSample { left_counts: f64::NAN, ..CountsSample::default() };
         let counts = WheelCounts::of(&WheelSample::default(), Some(&hostile));
-        assert_eq!(counts, WheelCounts::Cyclic([0; 2]));
+        assert_eq!(counts, Cyclic([0; 2]));
     }
 }

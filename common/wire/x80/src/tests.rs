@@ -87,19 +87,18 @@ fn commands_are_taken_in_every_form_that_hosts_send() {
 
 #[test]
 fn what_is_no_message_is_refused_with_its_did() {
-    let refusals = [
-        (parsed(27, &[0; 13]), 27),
-        (parsed(27, &[0; 11]), 27),
-        (parsed(26, &[6, 0, 0]), 26),
-        (parsed(30, &[]), 30),
-        (parsed(30, &[1, 9]), 30),
-        (parsed(7, &[14, 0, 3]), 7),
-        (parsed(7, &[8, 0, 1, 5]), 7),
-        (parsed(255, &[2]), 255),
-        (parsed(200, &[]), 200),
-    ];
-    for (refusal, did) in refusals {
-        let text = refusal.expect_err("was taken").to_string();
+    for (did, data) in [
+        (27, &[0; 13][..]),
+        (27, &[0; 11]),
+        (26, &[6, 0, 0]),
+        (30, &[]),
+        (30, &[1, 9]),
+        (7, &[14, 0, 3]),
+        (7, &[8, 0, 1, 5]),
+        (255, &[2]),
+        (200, &[]),
+    ] {
+        let text = parsed(did, data).expect_err("was taken").to_string();
         assert!(text.contains(&format!("DID {did}")), "{text}");
     }
 }

@@ -11,6 +11,7 @@ use common::{
 };
 
 use super::*;
+use Frame::*;
 use RobotFault::*;
 
 fn at(seconds: f64) -> Duration {
@@ -24,8 +25,7 @@ fn tick(counts: [u16; 2], sonar: u8) -> Vec<u8> {
     let ultrasonic = [sonar; 6];
     let standard = StandardSensors { ultrasonic, human: [2048; 4], ..StandardSensors::default() };
     let mut bytes = Vec::new();
-    for frame in [Frame::Motor(motor), Frame::Standard(standard), Frame::System(SystemSignal::Ack)]
-    {
+    for frame in [Motor(motor), Standard(standard), System(SystemSignal::Ack)] {
         frame.encode(Addressing::Numbered, &mut bytes);
     }
     bytes
@@ -48,14 +48,14 @@ fn frames(passed: &[Late]) -> Vec<Frame> {
 
 fn counts(passed: &[Late]) -> Option<[u16; 2]> {
     frames(passed).into_iter().find_map(|frame| match frame {
-        Frame::Motor(motor) => Some(motor.encoders.map(|encoder| encoder.position)),
+        Motor(motor) => Some(motor.encoders.map(|encoder| encoder.position)),
         _ => None,
     })
 }
 
 fn sonar(passed: &[Late]) -> Option<u8> {
     frames(passed).into_iter().find_map(|frame| match frame {
-        Frame::Standard(standard) => Some(standard.ultrasonic[1]),
+        Standard(standard) => Some(standard.ultrasonic[1]),
         _ => None,
     })
 }
@@ -87,7 +87,7 @@ fn every_frame_of_a_faulty_robot_is_valid_until_its_fault_ends() {
         let mut injector = x80(fault, 1);
         for number in 0..50 {
             let passed = injector.report(&tick([110, 210], 90), at(1.1 + 0.1 * f64::from(number)));
-            let acknowledged = frames(&passed).contains(&Frame::System(SystemSignal::Ack));
+            let acknowledged = frames(&passed).contains(&System(SystemSignal::Ack));
             assert_eq!(acknowledged, fault != Silence, "{fault:?}");
         }
         injector.set(None);
@@ -242,7 +242,7 @@ fn a_robot_keeps_its_speed_until_it_is_disabled_or_stands_where_it_is_held() {
         command(Command::Enable { on: false, channel: None }),
     ];
     let mut still = Vec::new();
-    Frame::Motor(MotorSensors::default()).encode(Addressing::Numbered, &mut still);
+    Motor(MotorSensors::default()).encode(Addressing::Numbered, &mut still);
     let json = [drive(2.0), drive(0.0), line(&Order::Brake {})];
     let (wheels, speeds) = (Some([1.0; 2]), Some([0.0; 2]));
     let still_line = line(&Report { wheels, speeds, ..Report::default() });

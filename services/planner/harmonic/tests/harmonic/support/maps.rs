@@ -197,9 +197,8 @@ impl Map {
 
     fn rooms(&mut self, side: usize, door: usize, random: &mut Random) {
         let ((wide, high), pitch) = (self.squares(side), side + 1);
-        let rooms =
-            (0..wide * high).map(|room| ((room % wide, room / wide), (room % wide, room / wide)));
-        self.carve(side, rooms);
+        let rooms = (0..wide * high).map(|room| (room % wide, room / wide));
+        self.carve(side, rooms.map(|room| (room, room)));
         for pair in spanning_tree(wide, high, 0.5, random) {
             let at = 1 + random.below(side - door + 1);
             self.open_door(pair, (pitch, pitch), 1, at..at + door);
