@@ -242,8 +242,8 @@ mod tests {
         let (_directory, path) = file();
         let (mut checkpoint, _) = open(&path);
         checkpoint.save(&vec![1_u32]).unwrap();
-        let refused = || Checkpoint::open::<[String; 3]>(&path, CAPACITY).unwrap_err();
-        assert!(refused().to_string().contains("cannot be decoded"), "{}", refused());
+        let refused = Checkpoint::open::<[String; 3]>(&path, CAPACITY).unwrap_err().to_string();
+        assert!(refused.contains("cannot be decoded"), "{refused}");
         let mut bytes = fs::read(&path).unwrap();
         let slot = checkpoint.slot_offset(1) as usize;
         bytes[slot + 3] = b'1';
