@@ -9,7 +9,7 @@ fn latency_is_measured_beside_hops_at_each_rate_and_leaves_nothing_but_what_was_
     // Another robot of this user, with its directory below the removed one.
     let run = Run::under_way("hops-beside", "open-room", ENDLESS, 0.3);
     let measured = |robot: &str, more: &str| {
-        let short = "bench tick --rounds 1 --set timeout_s=5 --json";
+        let short = "bench tick --rounds 1 --set timeout_s=15 --json";
         json_lines(&printed(&words(&format!("{short} --robot {robot} {more}"))))
     };
     let reports = measured("hops", "--busy 1 --set robot.rate_hz=20");
