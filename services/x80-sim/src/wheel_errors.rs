@@ -46,7 +46,8 @@ mod tests {
         let robots = (1..=200)
             .map(|seed| errors(&format!("seed = {seed}\nsimulation.realism = 'measured'")));
         let robots: Vec<_> = robots.collect();
-        let drawn: [(fn(&WheelErrors) -> f64, f64); 3] = [
+        type Value = fn(&WheelErrors) -> f64;
+        let drawn: [(Value, f64); 3] = [
             (|robot| robot.diameter[1] / robot.diameter[0] - 1.0, 0.008),
             (|robot| robot.track - 1.0, 0.025),
             (|robot| robot.slip_share, 0.005),
