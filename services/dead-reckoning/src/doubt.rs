@@ -1,6 +1,6 @@
 //! Doubts that no fix settles: unequal wheels, travel that no command explains, and fixes that
-//! contradicted the pose until it moved to them. They widen the published covariance only, because a wider filter's gates would accept
-//! anything.
+//! contradicted the pose until it moved to them. They widen the published covariance only, because
+//! a wider filter's gates would accept anything.
 
 use common::{clock::MissionTime, found_response::if_there, samples::WheelSample};
 use glam::DVec2;

@@ -130,10 +130,9 @@ impl Untold {
         let [before, judged, after] = [before, judged, after].map(|[_, counted]| *counted);
         for (wheel, way_m) in self.way_m.iter_mut().enumerate() {
             let told = self.recent.iter().map(|[told, _]| told[wheel]);
-            let explained = told.chain([before[wheel], after[wheel]]);
-            let [least, most] = [f64::min, f64::max].map(|of| explained.clone().reduce(of));
-            let untold_m = judged[wheel]
-                - judged[wheel].max(least.unwrap_or_default()).min(most.unwrap_or_default());
+            let [least, most] = [f64::min, f64::max]
+                .map(|of| told.clone().fold(of(before[wheel], after[wheel]), of));
+            let untold_m = judged[wheel] - judged[wheel].max(least).min(most);
             if untold_m.abs() > LEAST_UNTOLD_M {
                 *way_m += untold_m;
             }
