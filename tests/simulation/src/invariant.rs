@@ -142,7 +142,7 @@ impl Invariants {
                 self.obedience_changed = now;
                 self.has_lied |= fault.is_some_and(RobotFault::lies);
             }
-            _ => {}
+            KillSupervisor(_) | Wire(..) | Ask(_) | Beacon(_) | End => {}
         }
     }
 
