@@ -140,7 +140,7 @@ impl Lie {
     pub(crate) fn change(&mut self, report: &mut Report, before: &Report, now: Duration) {
         let stream = self.stream;
         match stream {
-            Stream::Wheel(_) | Stream::Wheels => self.miscount(report, before, now),
+            Stream::Wheel(_) | Stream::Wheels => return self.miscount(report, before, now),
             Stream::Gyro => {
                 if let Some(gyro) = &mut report.gyro {
                     *gyro = self.told(0, (*gyro, before.gyro), now).unwrap_or(*gyro);
@@ -152,7 +152,7 @@ impl Lie {
         let lies = |number: usize| match stream {
             Stream::Range(one) => one == number,
             Stream::HalfOfRanges(from) => number % 2 == from,
-            _ => stream == Stream::AllRanges,
+            _ => true,
         };
         for (number, (name, range)) in report.ranges.iter_mut().enumerate() {
             if lies(number) {
@@ -204,7 +204,10 @@ impl Lie {
         let truth = match (self.change, range) {
             // These need no truth.
             (Change::Stuck | Change::Near(_), _) => before?,
-            (Change::Wild(..), _) => return self.told(number, (FROZEN_M, None), now),
+            (Change::Wild(..), _) => {
+                let told = self.told(number, (range.unwrap_or(f64::NAN), None), now);
+                return told.filter(|told| !told.is_nan());
+            }
             (_, Some(range)) if range >= 0.0 => range,
             _ => return range,
         };
