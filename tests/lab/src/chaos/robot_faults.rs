@@ -77,10 +77,8 @@ fn one(healthy: &Healthy, fault: RobotFault) -> Entry {
             ("goes on", cause.map_or("", |cause| cause.name()).to_owned())
         }
     };
-    let target = mission.target;
-    let is_wrong =
-        |tick: &GroundTruthTick| (tick.x - target.x).hypot(tick.y - target.y) > RIGHT_PLACE_M;
-    if outcome == "reached" && truth.last().is_some_and(is_wrong) {
+    let off_m = off_m(mission, truth);
+    if outcome == "reached" && off_m > Some(RIGHT_PLACE_M) {
         outcome = "wrong_place";
     }
     // A robot that does not trust its pose has not said where it is.
@@ -104,7 +102,10 @@ fn one(healthy: &Healthy, fault: RobotFault) -> Entry {
     let contacts = |tick: Option<&GroundTruthTick>| tick.map_or(0, |tick| tick.contacts);
     let since = |then: Option<f64>| then.map_or(0.0, |then_s| (then_s - began_s).max(0.0));
     if fault == RobotFault::Drawn {
-        reason = format!("{}: {reason}", Lie::draw(mission));
+        // Uncalibrated wheels alone may lead that far.
+        let [off_m, healthy_m] = [off_m, healthy.off_m].map(Option::unwrap_or_default);
+        let lie = Lie::draw(mission);
+        reason = format!("{lie}: {off_m:.2} m off, {healthy_m:.2} m without it: {reason}");
     }
     Entry {
         fault,
@@ -121,11 +122,18 @@ fn one(healthy: &Healthy, fault: RobotFault) -> Entry {
     }
 }
 
+/// Returns the distance of the last place from the target.
+fn off_m(mission: &Mission, truth: &[GroundTruthTick]) -> Option<f64> {
+    let last = truth.last()?;
+    Some((last.x - mission.target.x).hypot(last.y - mission.target.y))
+}
+
 /// A robot without a fault.
 struct Healthy {
     scenario: Scenario,
     departed_s: Option<f64>,
     ended_s: f64,
+    off_m: Option<f64>,
 }
 
 impl Healthy {
@@ -134,7 +142,8 @@ impl Healthy {
         let truth = scenario.run().truth;
         let departed_s = summary::departed_s(mission, &truth);
         let ended_s = truth.last().map_or(0.0, |tick| tick.time_s);
-        Self { scenario, departed_s, ended_s }
+        let off_m = off_m(mission, &truth);
+        Self { scenario, departed_s, ended_s, off_m }
     }
 
     /// Draws the time of the fault, a while after the departure. Returns `None` if the mission ends
