@@ -145,8 +145,8 @@ payloads! {
         /// deviation; 1 and 0 if unknown and for a car.
         told_ratio: f64 = 1.0,
         told_ratio_sd: f64,
-        /// Counted travel, left and right, that neither commands nor the ticks beside it explain,
-        /// metres since the start of the link process.
+        /// Travel, left and right, that the counts or the commands and ranges alone show, metres
+        /// since the start of the link process.
         untold_m: [f64; 2],
     }
 

@@ -175,7 +175,7 @@ impl Doubt {
             true => format!(
                 "relative to the commands, the right wheel counts {told_ratio:.2} times as much as the left"
             ),
-            false => "the counts of the wheels jump without a command".to_owned(),
+            false => "commands or ranges contradict the counts of the wheels".to_owned(),
         };
         Some(format!(
             "{seen}, so the pose is uncertain by {:.1} m or more; check encoders and wheels",

@@ -15,6 +15,7 @@ mod hearing;
 pub mod latency_monitor;
 pub(crate) mod modelled_wheels;
 pub mod monitor;
+mod motion_bank;
 pub mod odometry;
 pub mod orders;
 pub mod presence;

@@ -28,8 +28,9 @@ use crate::{
     clock_rate::ClockRate,
     drivers,
     failsafe::{
-        Decision, Failsafe,
+        Decision, Failsafe, Monitors,
         monitor::{Moment, Observation},
+        odometry::Odometry,
         presence::Absence,
         restart::RestartWatch,
         wheel_shares::WheelRatio,
@@ -330,13 +331,14 @@ impl Link {
             self.state.next_tick += 1;
         }
         let endless = motion.endless;
-        let shares = &self.failsafe.monitors.odometry.shares;
+        let Monitors { odometry: Odometry { shares, .. }, range, .. } = &self.failsafe.monitors;
         let WheelRatio { ratio, deviation } = shares.ratio();
+        let [by_commands, by_ranges] = [shares.untold_m(), range.untold_m()];
         let wheels = WheelSample {
             restarts: self.restart.restarts,
             told_ratio: ratio,
             told_ratio_sd: deviation,
-            untold_m: shares.untold_m(),
+            untold_m: [0, 1].map(|wheel| by_commands[wheel] + by_ranges[wheel]),
             ..motion.wheels
         };
         self.wheels = wheels;

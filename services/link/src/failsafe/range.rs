@@ -25,8 +25,9 @@ use common::{
 use super::{
     hearing::Hearing,
     monitor::{Condition, Counts, Moment, Monitor, Observation},
+    motion_bank::Poses,
     range_motion::RangeMotion,
-    scan_motion::{Poses, ScanMotion},
+    scan_motion::ScanMotion,
 };
 
 /// Spread of stuck readings, metres: a centimetre to either side plus rounding, and a stuck
@@ -213,6 +214,10 @@ pub struct Range {
     scans: Vec<ScanMotion>,
     hearing: Hearing,
     motion: RangeMotion,
+    /// Motion by the wheels up to which `untold` is complete.
+    told: Option<Pose2>,
+    /// Travel and turn that the readings show and the wheels do not count, metres and radians.
+    untold: [f64; 2],
 }
 
 impl Range {
@@ -235,6 +240,22 @@ impl Range {
             }
         }
         self.poses.robot_is(self.pose, now);
+    }
+
+    /// Returns the travel of the left and the right wheel that the wheels do not count, metres.
+    pub(crate) fn untold_m(&self) -> [f64; 2] {
+        let ([along, turn], half_track_m) = (self.untold, self.body.track_m / 2.0);
+        [along - turn * half_track_m, along + turn * half_track_m]
+    }
+
+    fn tell(&mut self) {
+        let rolls = self.motion.rolls();
+        self.told = rolls.map(|(share, since_s)| {
+            let from = self.told.unwrap_or_else(|| self.poses.at(since_s));
+            self.untold[0] += (share - 1.0) * from.position.distance(self.pose.position);
+            self.untold[1] += (share - 1.0) * (self.pose.heading - from.heading);
+            self.pose
+        });
     }
 
     fn judged(&self, sure: bool) -> Option<String> {
@@ -272,6 +293,8 @@ impl Monitor for Range {
             scans: lasers.into_iter().map(|(row, sensor)| ScanMotion::new(row, sensor)).collect(),
             hearing: Hearing::of(mission),
             motion: RangeMotion::of(mission),
+            told: None,
+            untold: [0.0; 2],
         }
     }
 
@@ -287,6 +310,7 @@ impl Monitor for Range {
                 }
                 self.hearing.take(readings, self.pose, now.time.seconds());
                 self.motion.take(readings, &self.poses, now.time.seconds());
+                self.tell();
             }
             Observation::Scan(scan, at_s) => {
                 if let Some(scans) = self.scans.iter_mut().find(|scans| scans.row == scan.row) {
@@ -349,7 +373,7 @@ mod tests {
                 |sensor: u8, cm: u16| reading(sensor, (cm != 255).then_some(f64::from(cm) / 100.0));
             let beside = of((sensor + 1) % 3, 20 + 9 * (tick % 2) as u16);
             monitor.observe(&Observation::Readings(&[beside, of(sensor, range_cm(tick))]), now);
-            monitor.condition(Cause::RangeImplausible, now) == Condition::Holds
+            monitor.rows.iter().any(|row| row.condition(true, now) == Condition::Holds)
         })
     }
 

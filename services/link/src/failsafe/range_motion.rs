@@ -26,9 +26,28 @@ use common::{
 };
 use glam::DVec2;
 
-use super::scan_motion::{Poses, best};
+use super::motion_bank::{
+    Bank,
+    Hypothesis::{self, Late, Rolls},
+    Poses, Row, rolled,
+};
 
-const DELAYS_S: [f64; 8] = [0.0, 0.3, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0];
+/// Limits of the sums, metres.
+const LATE: [f64; 2] = [1.6, 2.8];
+const ALL: [Row; 12] = [
+    (Hypothesis::HEALTHY, LATE),
+    (Late(0.3), LATE),
+    (Late(0.5), LATE),
+    (Late(0.75), LATE),
+    (Late(1.0), LATE),
+    (Late(1.25), LATE),
+    (Late(1.5), LATE),
+    (Late(2.0), LATE),
+    (Rolls(0.5), [2.2, 3.5]),
+    (Rolls(0.75), [1.1, 1.8]),
+    (Rolls(1.33), [0.6, 1.0]),
+    (Rolls(2.0), [1.4, 2.3]),
+];
 /// Share of the reach within which hits are reliable.
 const KNOWN: f64 = 0.82;
 /// Share of a sonar's field of view, to either side, that may hold its surface: its edge reaches
@@ -55,12 +74,11 @@ const TELLS_M: f64 = 0.03;
 /// As in [`super::scan_motion`].
 const FACTOR: f64 = 1.15;
 const FADE_S: f64 = 12.0;
-const BETTER: [f64; 2] = [1.6, 2.8];
 
 #[derive(Clone, Debug)]
 struct Hit {
     /// Place under each delay.
-    under: [DVec2; DELAYS_S.len()],
+    under: [DVec2; ALL.len()],
     /// Ends and quarters of the arc of a prompt reading.
     arc: [DVec2; 4],
 }
@@ -81,18 +99,21 @@ impl Newest {
     }
 }
 
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct RangeMotion {
     sensors: BTreeMap<u8, Sensor>,
     hits: VecDeque<(f64, Hit)>,
     newest: BTreeMap<u8, Newest>,
-    /// Robot at the newest hits, under each delay.
-    latest: [Pose2; DELAYS_S.len()],
+    /// Robot now by the wheels, and under each hypothesis.
+    robot: Pose2,
+    robots: [Pose2; ALL.len()],
+    /// Robot at the newest hits, under each hypothesis.
+    latest: [Pose2; ALL.len()],
     newest_s: f64,
     /// Time in motion, seconds.
     motion_s: f64,
     /// Sums for a lag as long as the hits compared, and for one that has just begun.
-    better: [[f64; DELAYS_S.len()]; 2],
+    better: [Bank<{ ALL.len() }>; 2],
 }
 
 impl RangeMotion {
@@ -100,15 +121,37 @@ impl RangeMotion {
         let is_single = |sensor: &Sensor| sensor.used && sensor.kind != SensorKind::Scan;
         let table = (0..).zip(mission.sensor_table());
         let sensors = table.filter(|(_, sensor)| is_single(sensor)).collect();
-        Self { sensors, ..Self::default() }
+        Self::with(sensors)
+    }
+
+    fn with(sensors: BTreeMap<u8, Sensor>) -> Self {
+        Self {
+            sensors,
+            hits: VecDeque::new(),
+            newest: BTreeMap::new(),
+            robot: Pose2::default(),
+            robots: [Pose2::default(); ALL.len()],
+            latest: [Pose2::default(); ALL.len()],
+            newest_s: 0.0,
+            motion_s: 0.0,
+            better: [(); 2].map(|()| Bank::of(&ALL)),
+        }
     }
 
     pub(super) fn reset(&mut self) {
-        *self = Self { sensors: std::mem::take(&mut self.sensors), ..Self::default() };
+        *self = Self::with(std::mem::take(&mut self.sensors));
     }
 
     pub(super) fn take(&mut self, readings: &[RangeReading], poses: &Poses, at_s: f64) {
-        let robots = DELAYS_S.map(|delay_s| poses.at(at_s - delay_s));
+        let counted = [self.robot, poses.at(at_s)];
+        self.robot = counted[1];
+        for (robot, (hypothesis, _)) in self.robots.iter_mut().zip(ALL) {
+            *robot = match hypothesis {
+                Late(by_s) => poses.at(at_s - by_s),
+                Rolls(share) => rolled(*robot, counted, share),
+            };
+        }
+        let robots = self.robots;
         let moved = std::array::from_fn(|it| {
             let [now, then] = [robots[it], self.latest[it]];
             let turned_m = 0.1 * (now.heading - then.heading).abs();
@@ -116,16 +159,15 @@ impl RangeMotion {
         });
         // A clock may have been set back.
         let passed_s = (at_s - self.newest_s).abs().min(APART_S[1]);
-        let is_sure = self.better.as_flattened().iter().any(|better| *better > BETTER[1]);
-        if is_sure || passed_s < APART_S[0] || moved == [false; DELAYS_S.len()] {
+        let is_sure = self.better.iter().any(|bank| bank.likeliest(true).is_some());
+        if is_sure || passed_s < APART_S[0] || moved == [false; ALL.len()] {
             return;
         }
         (self.latest, self.newest_s) = (robots, at_s);
         self.motion_s += passed_s;
         assert!((APART_S[0]..=APART_S[1]).contains(&passed_s));
         let now_s = self.motion_s;
-        let fade = (-passed_s / FADE_S).exp();
-        self.better.as_flattened_mut().iter_mut().for_each(|better| *better *= fade);
+        self.better.iter_mut().for_each(|bank| bank.fade((-passed_s / FADE_S).exp()));
         let is_old = |(then_s, _): &(f64, Hit)| now_s - then_s > MOST_AGE_S;
         while self.hits.len() > MOST_HITS || self.hits.front().is_some_and(is_old) {
             self.hits.pop_front();
@@ -157,11 +199,13 @@ impl RangeMotion {
             };
             self.newest.insert(reading.sensor, Newest { range_m, robot: robots[0], jumped_s });
             let lags = 1 + usize::from(at_s - jumped_s < JUMP_S);
-            let mut least_m = [[NEW_M; 2]; DELAYS_S.len()];
+            let mut least_m = [[NEW_M; 2]; ALL.len()];
             for (_, other) in self.hits.range(..older) {
                 for (delay, [long, begun]) in least_m.iter_mut().enumerate() {
                     *long = long.min(off_m(delay, other.under[delay]));
-                    if delay > 0 && lags == 1 {
+                    // Motion that begins to differ moves no earlier hit.
+                    let is_late = matches!(ALL[delay].0, Late(_));
+                    if delay > 0 && (lags == 1 || !is_late) {
                         continue;
                     }
                     let prompt = other.arc.iter().chain([&other.under[0]]);
@@ -169,14 +213,13 @@ impl RangeMotion {
                 }
             }
             let [_, prompt_m] = least_m[0];
-            for (lag, sums) in self.better.iter_mut().enumerate().take(lags) {
+            for (lag, bank) in self.better.iter_mut().enumerate().take(lags) {
                 let least_m = least_m.map(|it| it[lag]);
                 let [least, most] =
                     [f64::min, f64::max].map(|of| least_m.into_iter().fold(least_m[0], of));
                 if least < NEAR_M && most - least > TELLS_M {
-                    let sums = sums.iter_mut().zip(least_m).zip(moved);
-                    for ((sum, other), _) in sums.filter(|(_, moved)| *moved) {
-                        *sum = (*sum + prompt_m - FACTOR * other).max(0.0);
+                    for hypothesis in (0..ALL.len()).filter(|it| moved[*it]) {
+                        bank.add(hypothesis, prompt_m - FACTOR * least_m[hypothesis], at_s);
                     }
                 }
             }
@@ -186,12 +229,16 @@ impl RangeMotion {
         }
     }
 
+    /// Returns how far the robot likely rolls, relative to what its wheels count, and since when.
+    pub(super) fn rolls(&self) -> Option<(f64, f64)> {
+        match self.better[0].likeliest(false)? {
+            (Rolls(share), since_s) => Some((share, since_s)),
+            _ => None,
+        }
+    }
+
     pub(super) fn judged(&self, sure: bool) -> Option<String> {
-        let least = BETTER[usize::from(sure)];
-        let likely_s = self.better.iter().find_map(|sums| best(&DELAYS_S, sums, least))?;
-        Some(format!(
-            "the readings of sonars and infrared rangers are consistent only if they are {likely_s} s late; find what delays them, then run `firsthand stop` and `resume`"
-        ))
+        self.better.iter().find_map(|bank| bank.judged(sure, "sonars and infrared rangers"))
     }
 }
 

@@ -7,15 +7,32 @@
 
 use std::collections::VecDeque;
 
-use common::{clock::MissionTime, driver::LaserScan, kinematics::Pose2, mission::Sensor};
+use common::{driver::LaserScan, kinematics::Pose2, mission::Sensor};
 use glam::DVec2;
 
-/// Candidate delays, seconds; infinity stands for no motion.
-const DELAYS_S: [f64; 10] = [0.0, 0.3, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, f64::INFINITY];
+use super::motion_bank::{
+    Bank,
+    Hypothesis::{self, Late, Rolls},
+    Poses, Row,
+};
+
+/// Limits of the sums, metre-seconds.
+const LIMITS: [f64; 2] = [0.016, 0.03];
+const ALL: [Row; 10] = [
+    (Hypothesis::HEALTHY, LIMITS),
+    (Late(0.3), LIMITS),
+    (Late(0.5), LIMITS),
+    (Late(0.75), LIMITS),
+    (Late(1.0), LIMITS),
+    (Late(1.25), LIMITS),
+    (Late(1.5), LIMITS),
+    (Late(1.75), LIMITS),
+    (Late(2.0), LIMITS),
+    (Rolls(0.0), LIMITS),
+];
 const APART_S: f64 = 0.45;
 const MOST_APART_S: f64 = 1.0;
-/// Bound on kept poses and scans. Poses of the longest delay plus the time between two scans, 3 s,
-/// are needed.
+/// Bound on kept scans.
 const MOST_KEPT: usize = 2048;
 const BEAMS: usize = 180;
 const LEAST_BEAMS: f64 = 20.0;
@@ -25,41 +42,8 @@ const MOST_M: f64 = 0.3;
 const FADE_S: f64 = 4.0;
 /// Least spread of mean differences that distinguishes delays, metres.
 const TELLS_M: f64 = 0.005;
-/// Factor by which a delay must fit better, and sums for doubt and for certainty, metre-seconds.
+/// Factor by which a hypothesis must fit better.
 const FACTOR: f64 = 1.2;
-const BETTER: [f64; 2] = [0.016, 0.03];
-
-#[derive(Clone, Debug, Default)]
-pub(super) struct Poses(VecDeque<(f64, Pose2)>);
-
-impl Poses {
-    pub(super) fn robot_is(&mut self, pose: Pose2, now: MissionTime) {
-        self.0.push_back((now.seconds(), pose));
-        if self.0.len() > MOST_KEPT {
-            self.0.pop_front();
-        }
-    }
-
-    pub(super) fn at(&self, at_s: f64) -> Pose2 {
-        let after = self.0.partition_point(|(then, _)| *then < at_s);
-        let before = after.saturating_sub(1);
-        let kept = |it: usize| self.0.get(it).or(self.0.back()).copied().unwrap_or_default();
-        let ((from_s, from), (to_s, to)) = (kept(before), kept(after));
-        let share = if to_s > from_s { (at_s - from_s) / (to_s - from_s) } else { 0.0 };
-        let share = share.clamp(0.0, 1.0);
-        Pose2 {
-            position: from.position.lerp(to.position, share),
-            heading: from.heading + share * (to.heading - from.heading),
-        }
-    }
-}
-
-pub(super) fn best(delays_s: &[f64], better: &[f64], least: f64) -> Option<f64> {
-    assert_eq!(delays_s.len(), better.len());
-    let better = delays_s.iter().zip(better);
-    let (likely_s, better) = better.max_by(|(_, one), (_, other)| one.total_cmp(other))?;
-    (*better > least).then_some(*likely_s)
-}
 
 #[derive(Clone, Debug)]
 pub(super) struct ScanMotion {
@@ -67,13 +51,12 @@ pub(super) struct ScanMotion {
     sensor: Sensor,
     /// Recent scans. The newest is judged once later poses are known.
     scans: VecDeque<(f64, Vec<f32>)>,
-    /// Advantage of each delay over none.
-    better: [f64; DELAYS_S.len()],
+    better: Bank<{ ALL.len() }>,
 }
 
 impl ScanMotion {
     pub(super) fn new(row: usize, sensor: Sensor) -> Self {
-        Self { row, sensor, scans: VecDeque::new(), better: [0.0; DELAYS_S.len()] }
+        Self { row, sensor, scans: VecDeque::new(), better: Bank::of(&ALL) }
     }
 
     pub(super) fn reset(&mut self) {
@@ -81,31 +64,26 @@ impl ScanMotion {
     }
 
     pub(super) fn take(&mut self, scan: &LaserScan, poses: &Poses, at_s: f64) {
-        if poses.0.is_empty() || scan.beams.len() != self.sensor.beams {
+        if poses.is_empty() || scan.beams.len() != self.sensor.beams {
             return;
         }
         if let Some((newest_s, newest)) = self.scans.back()
             && let Some((first_s, first)) = self.scans.front()
             && (APART_S..=MOST_APART_S).contains(&(newest_s - first_s))
         {
-            let unlike = |delay_s: f64| {
-                let [from, to] = if delay_s.is_infinite() {
-                    [Pose2::default(); 2]
-                } else {
-                    [poses.at(first_s - delay_s), poses.at(newest_s - delay_s)]
-                };
+            let unlike = ALL.map(|(hypothesis, _)| {
+                let [from, to] = hypothesis.robots(poses, [*first_s, *newest_s]);
                 self.unlike((first, from), (newest, to))
-            };
-            let unlike = DELAYS_S.map(unlike);
+            });
             let [least, most] = [f64::min, f64::max].map(|of| unlike.into_iter().reduce(of));
             // NaN, from too few beams, fails the comparison.
             if unlike.iter().all(|it| it.is_finite())
                 && most.zip(least).is_some_and(|(most, least)| most - least >= TELLS_M)
             {
                 let for_s = (at_s - newest_s).clamp(0.0, APART_S);
-                for (sum, other) in self.better.iter_mut().zip(unlike) {
-                    let better = (unlike[0] - FACTOR * other) * for_s;
-                    *sum = (*sum * (-for_s / FADE_S).exp() + better).max(0.0);
+                self.better.fade((-for_s / FADE_S).exp());
+                for (hypothesis, other) in unlike.into_iter().enumerate() {
+                    self.better.add(hypothesis, (unlike[0] - FACTOR * other) * for_s, at_s);
                 }
             }
         }
@@ -137,16 +115,7 @@ impl ScanMotion {
     }
 
     pub(super) fn judged(&self, sure: bool) -> Option<String> {
-        let likely_s = best(&DELAYS_S, &self.better, BETTER[usize::from(sure)])?;
-        let name = &self.sensor.name;
-        Some(match likely_s {
-            f64::INFINITY => format!(
-                "the scans of {name} do not change although the wheels turn; check the laser, and whether the wheels slip, then run `firsthand stop` and `resume`"
-            ),
-            delay_s => format!(
-                "the scans of {name} are {delay_s} s later than stated, by the wheels' motion; find what delays them, or send their age, then run `firsthand stop` and `resume`"
-            ),
-        })
+        self.better.judged(sure, &self.sensor.name)
     }
 }
 
@@ -194,7 +163,7 @@ mod tests {
             assert_eq!(said(speed_m_s, |tick| tick), None);
             for (late, delay) in [(5, "0.5"), (10, "1"), (20, "2")] {
                 let said = said(speed_m_s, |tick| tick.saturating_sub(late)).unwrap();
-                assert!(said.contains(&format!("laser are {delay} s later")), "{said}");
+                assert!(said.contains(&format!("they are {delay} s later")), "{said}");
             }
             let said = said(speed_m_s, |tick| tick.min(10)).unwrap();
             assert!(said.contains("do not change although the wheels turn"), "{said}");
