@@ -4,7 +4,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    bus::ZeroCopySend,
+    bus::{Kind, Layout as _, Value, ZeroCopySend},
     latency,
     mission::{INFRARED_RANGERS, Sensor, wire_enum},
 };
@@ -102,6 +102,25 @@ impl Sweep {
     }
 }
 
+impl DoubtsSample {
+    /// Returns each doubt's name and evidence.
+    pub fn each(&self) -> Vec<(&'static str, f64)> {
+        let Value::Struct(fields) = self.value() else { return Vec::new() };
+        let evidence = |(name, value)| match value {
+            Value::Double(evidence) => Some((name, evidence)),
+            _ => None,
+        };
+        fields.into_iter().filter_map(evidence).collect()
+    }
+
+    /// Returns each doubt's name and meaning, in the order of [`Self::each`].
+    pub fn meanings() -> Vec<(&'static str, &'static str)> {
+        let Kind::Struct(structure) = Self::kind() else { return Vec::new() };
+        let doubts = structure.fields.into_iter().filter(|it| matches!(it.kind, Kind::Number(_)));
+        doubts.map(|doubt| (doubt.name, doubt.doc.trim())).collect()
+    }
+}
+
 impl ScanHeader {
     pub const fn sweep(&self) -> Sweep {
         let Self { first_beam_ns, beam_ns, first_beam, .. } = *self;
@@ -148,6 +167,34 @@ payloads! {
         /// Travel, left and right, that the counts or the commands and ranges alone show, metres
         /// since the start of the link process.
         untold_m: [f64; 2],
+    }
+
+    /// Evidence of the link against a healthy robot. At 1 the robot stands.
+    "firsthand.Doubts" DoubtsSample {
+        /// The left wheel does not follow its commands
+        left_wheel: f64,
+        /// The right wheel does not follow its commands
+        right_wheel: f64,
+        /// The robot does not turn as commanded
+        turn: f64,
+        /// The wheels turn without a command
+        uncommanded: f64,
+        /// Counts jump farther than wheels can turn
+        jumps: f64,
+        /// By its ranges, the robot rolls another distance than its wheels count
+        miscounted: f64,
+        /// Readings of sonars and infrared rangers are later than stated
+        late_ranges: f64,
+        /// Scans are later than stated
+        late_scans: f64,
+        /// Scans do not change although the wheels turn
+        frozen_scans: f64,
+        /// A reading stays although the robot moves
+        stuck: f64,
+        /// Readings do not follow from one another
+        inconsistent: f64,
+        /// A sensor hears nothing where a reading is due
+        deaf: f64,
     }
 
     /// Counts of [`WheelSample`] without wraparound, whole numbers.

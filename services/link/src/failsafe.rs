@@ -35,7 +35,7 @@ use std::time::Duration;
 
 use common::{
     mission::Mission,
-    samples::{Action, Cause},
+    samples::{Action, Cause, DoubtsSample},
 };
 
 use self::monitor::{Clears, Moment, Monitor, Observation};
@@ -54,6 +54,12 @@ macro_rules! monitors {
 
             pub(crate) fn observe(&mut self, what: &Observation<'_>, now: Moment) {
                 $(self.$name.observe(what, now);)*
+            }
+
+            pub(crate) fn doubts(&self) -> DoubtsSample {
+                let mut doubts = DoubtsSample::default();
+                $(self.$name.doubt(&mut doubts);)*
+                doubts
             }
         }
     };

@@ -19,8 +19,8 @@ use common::{
     stage::Runner,
     stop_socket::{Identity, OwedStop, Request, StopMark, StopSocket},
     topics::{
-        BASE_RESPONSE, COMMAND, CONTACT, COUNTS, DIRECTIVE, IMU_TURN, INFRARED, LINK, POWER,
-        RANGES, SCAN, SURROUNDINGS, TICK_LIMIT, WHEELS, WIRE,
+        BASE_RESPONSE, COMMAND, CONTACT, COUNTS, DIRECTIVE, DOUBTS, IMU_TURN, INFRARED, LINK,
+        POWER, RANGES, SCAN, SURROUNDINGS, TICK_LIMIT, WHEELS, WIRE,
     },
     wiring::{Persists, Topics},
 };
@@ -91,6 +91,7 @@ impl Process for Shell {
     const WAKES: Topics = &[&COMMAND, &DIRECTIVE, &TICK_LIMIT];
     const OUTPUTS: Topics = &[
         &BASE_RESPONSE,
+        &DOUBTS,
         &CONTACT,
         &SCAN,
         &IMU_TURN,

@@ -11,8 +11,8 @@ use common::{
     stage::{ForeignState, Stage},
     start::StageError,
     topics::{
-        BASE_RESPONSE, CONTACT, COUNTS, IMU_TURN, INFRARED, POWER, RANGES, SCAN, SURROUNDINGS,
-        WHEELS, WIRE, WIRE_PIECE,
+        BASE_RESPONSE, CONTACT, COUNTS, DOUBTS, IMU_TURN, INFRARED, POWER, RANGES, SCAN,
+        SURROUNDINGS, WHEELS, WIRE, WIRE_PIECE,
     },
 };
 
@@ -78,6 +78,7 @@ impl LinkStage {
                 out.publish_slice(&RANGES, RangesHeader::default(), &ranges)?;
                 out.publish(&COUNTS, endless)?;
                 out.publish(&WHEELS, wheels)?;
+                out.publish(&DOUBTS, self.link.doubts())?;
             }
             Effect::Infrared(sample) => self.infrared = Some(sample),
             Effect::Power(sample) => self.power = Some(sample),

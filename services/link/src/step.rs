@@ -17,8 +17,8 @@ use common::{
     driver::{Base, Driver, Memory, Motion, Turn, WireTally, counts::WheelCounts},
     mission::Mission,
     samples::{
-        Action, Cause, CommandSample, CommandState, HoldReason, LinkSample, Order, Rest,
-        TurnSample, WheelSample,
+        Action, Cause, CommandSample, CommandState, DoubtsSample, HoldReason, LinkSample, Order,
+        Rest, TurnSample, WheelSample,
     },
     stop_socket::Request,
 };
@@ -160,6 +160,10 @@ impl Link {
             refused_ns: None,
             stamped: None,
         }
+    }
+
+    pub(crate) fn doubts(&self) -> DoubtsSample {
+        self.failsafe.monitors.doubts()
     }
 
     pub fn restore(&mut self, state: State) {

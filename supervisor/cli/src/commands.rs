@@ -5,6 +5,7 @@ mod calibrate;
 mod check;
 mod diff;
 mod doctor;
+mod doubts;
 mod go_back;
 mod goto;
 pub mod help;
@@ -81,6 +82,7 @@ commands! {
     "Look at it" {
         Topic topic,
         Logs logs,
+        Doubts doubts,
         Runs runs,
         Table table,
         Map map,

@@ -17,7 +17,8 @@ use common::{
     mission::{Body, Mission, ModelledSpeed, Sensor, SensorKind},
     readers,
     samples::{
-        CommandSample, FixSample, PoseSample, RangeReading, RangeStatus, RangesHeader, TurnSample,
+        Cause, CommandSample, DoubtsSample, FixSample, LinkSample, PoseSample, RangeReading,
+        RangeStatus, RangesHeader, TurnSample,
     },
     topics,
     wire::counts_between,
@@ -53,6 +54,15 @@ const ROBOTS: [(&str, &[&str]); 8] = [
     ("TurtleBot3 Burger", &["robot.model='turtlebot3-burger'"]),
 ];
 const REALISMS: [&str; 3] = ["laboratory", "measured", "harsh"];
+/// Causes that a healthy robot should not give.
+const FAULTS: [Cause; 6] = [
+    Cause::OdometryImplausible,
+    Cause::RangeImplausible,
+    Cause::RangeDoubtful,
+    Cause::RobotDoesNotStop,
+    Cause::AnotherCommander,
+    Cause::BaseSlow,
+];
 const OUTAGES: [f64; 4] = [0.0, 0.0, 0.0, 0.1];
 /// Longest interval of poses over which a residual is taken, seconds.
 const LONGEST_S: f64 = 1.0;
@@ -64,7 +74,8 @@ const SAME_SURFACE_M: f64 = 0.3;
 /// Drive healthy missions of drawn robots in one process, and measure how far what each source
 /// says is from what the others predict.
 ///
-/// Writes `corpus.csv`, a row per robot and residual, and `residuals.csv`, a row per residual.
+/// Writes `corpus.csv`, a row per robot and residual, and `residuals.csv`, a row per residual. Writes
+/// `doubts.csv` with how often each doubt would stop a healthy robot.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Number of missions.
@@ -120,12 +131,17 @@ pub fn main(arguments: &Arguments) -> Result {
     let mut rows = csv::Writer::from_path(directory.join("residuals.csv"))?;
     rows.write_record(["mission", "robot", "residual", "tick", "value"])?;
     let mut all: BTreeMap<(&str, Source), Vec<f64>> = BTreeMap::new();
+    let mut doubts = Doubts::default();
     let drive =
         |&number: &u64, _: usize| (number, drive(seed, number).map_err(|error| error.to_string()));
     let mut failed = 0;
     in_parallel((0..count).collect(), arguments.jobs, drive, |(number, driven)| {
         match driven {
-            Ok((robot, residuals)) => {
+            Ok((robot, Healthy { residuals, hours, greatest, causes })) => {
+                for cause in &causes {
+                    say(format_args!("mission {number}, {robot}: {}", cause.name()));
+                }
+                doubts.add(hours, &greatest, causes);
                 for Residual { source, tick, value } in residuals {
                     rows.serialize((number, robot, source, tick, format!("{value:.6}")))?;
                     all.entry((robot, source)).or_default().push(value);
@@ -140,6 +156,7 @@ pub fn main(arguments: &Arguments) -> Result {
     })?;
     rows.flush()?;
     summarize(all, &directory.join("corpus.csv"))?;
+    doubts.write(&directory.join("doubts.csv"))?;
     print_line(format!("{count} missions from seed {seed}; see {}", directory.display()))?;
     match failed {
         0 => Ok(()),
@@ -164,12 +181,80 @@ fn summarize(all: BTreeMap<(&str, Source), Vec<f64>>, file: &Path) -> Result {
     Ok(summary.flush()?)
 }
 
-/// Drives a drawn mission. Returns the robot and its residuals.
-fn drive(seed: u64, number: u64) -> Result<(&'static str, Vec<Residual>)> {
+/// Part of the missions whose greatest evidence is the tail that is extrapolated.
+const TAIL: f64 = 0.05;
+const PER_HOURS: f64 = 100.0;
+
+/// Evidence against healthy robots.
+#[derive(Default)]
+struct Doubts {
+    hours: f64,
+    /// Greatest evidence of each mission, by doubt.
+    greatest: BTreeMap<&'static str, Vec<f64>>,
+    causes: BTreeMap<&'static str, u32>,
+}
+
+impl Doubts {
+    fn add(&mut self, hours: f64, greatest: &BTreeMap<&'static str, f64>, causes: Vec<Cause>) {
+        self.hours += hours;
+        for (doubt, evidence) in greatest {
+            self.greatest.entry(doubt).or_default().push(*evidence);
+        }
+        for cause in causes {
+            *self.causes.entry(cause.name()).or_default() += 1;
+        }
+    }
+
+    /// Extrapolates how often each doubt reaches 1, at which the robot stands.
+    ///
+    /// The excess over a high threshold is distributed exponentially (J. Pickands, "Statistical
+    /// inference using extreme order statistics", Annals of Statistics 3, 1975; shape 0).
+    fn write(self, file: &Path) -> Result {
+        let per_hours = |count: f64| format!("{:.2}", count / self.hours * PER_HOURS);
+        let mut rows = csv::Writer::from_path(file)?;
+        rows.write_record(["section", "doubt", "hours", "95 %", "largest", "found", "expected"])?;
+        let hours = format!("{:.1}", self.hours);
+        for (doubt, mut all) in self.greatest {
+            all.sort_by(f64::total_cmp);
+            let (below, tail) = all.split_at(((1.0 - TAIL) * all.len() as f64) as usize);
+            let least = below.last().copied().unwrap_or_default();
+            let mean = tail.iter().map(|it| it - least).sum::<f64>() / tail.len() as f64;
+            let expected = if mean > 0.0 { (-(1.0 - least) / mean).exp().min(1.0) } else { 0.0 };
+            let found = tail.iter().filter(|it| **it >= 1.0).count();
+            let largest = tail.last().copied().unwrap_or_default();
+            let figures = [least, largest].map(|figure| format!("{figure:.2}"));
+            let rates = [found as f64, expected * tail.len() as f64].map(per_hours);
+            rows.serialize(("doubts", doubt, &hours, figures, rates))?;
+        }
+        for (cause, count) in self.causes {
+            rows.serialize((
+                "doubts",
+                cause,
+                &hours,
+                ["", ""],
+                [per_hours(count.into()), String::new()],
+            ))?;
+        }
+        Ok(rows.flush()?)
+    }
+}
+
+/// What a healthy mission shows.
+#[derive(Default)]
+struct Healthy {
+    residuals: Vec<Residual>,
+    hours: f64,
+    greatest: BTreeMap<&'static str, f64>,
+    /// Causes that say that the robot is faulty.
+    causes: Vec<Cause>,
+}
+
+/// Drives a drawn mission. Returns the robot and what it shows.
+fn drive(seed: u64, number: u64) -> Result<(&'static str, Healthy)> {
     let _quiet = simulate::quietly();
     let (robot, scenario) = draw(seed, number)?;
-    let residuals = residuals(&scenario);
-    Ok((robot, residuals.map_err(|it| format!("{robot}, {}: {it}", scenario.mission.name))?))
+    let healthy = healthy(&scenario);
+    Ok((robot, healthy.map_err(|it| format!("{robot}, {}: {it}", scenario.mission.name))?))
 }
 
 /// Draws a robot and its mission.
@@ -191,7 +276,7 @@ fn draw(seed: u64, number: u64) -> Result<(&'static str, Scenario)> {
     Ok((robot, Scenario { load, ..Scenario::calm(&mission) }))
 }
 
-fn residuals(scenario: &Scenario) -> Result<Vec<Residual>> {
+fn healthy(scenario: &Scenario) -> Result<Healthy> {
     let (ran, watch) = simulate::observe(scenario, Watch::new(&scenario.mission));
     if let Some(broken) = ran.broken {
         return Err(broken.to_string().into());
@@ -199,7 +284,13 @@ fn residuals(scenario: &Scenario) -> Result<Vec<Residual>> {
     let mut watch = watch.ok_or("the simulation still watches a run that has ended")?;
     watch.failed.take().map_or(Ok(()), Err).or_cannot("read the bus of a simulation")?;
     watch.judge_poses(&ran.truth);
-    Ok(watch.found)
+    let mut driven = Healthy { residuals: watch.found, ..Healthy::default() };
+    // A robot that was touched may rightly be doubted.
+    if ran.truth.last().is_some_and(|truth| truth.contacts == 0) {
+        driven.hours = ran.simulated.as_secs_f64() / 3600.0;
+        (driven.greatest, driven.causes) = (watch.greatest, watch.causes);
+    }
+    Ok(driven)
 }
 
 impl Observer for Watch {
@@ -228,6 +319,8 @@ readers! {
             turn: Reader<TurnSample> = topics::IMU_TURN,
             fix: Reader<FixSample> = topics::SCAN_FIX,
             ranges: Reader<RangesHeader, RangeReading> = topics::RANGES,
+            doubts: Reader<DoubtsSample> = topics::DOUBTS,
+            link: Reader<LinkSample> = topics::LINK,
         }
     }
 }
@@ -237,6 +330,9 @@ struct Watch {
     readers: Option<Inputs>,
     failed: Option<BusError>,
     found: Vec<Residual>,
+    greatest: BTreeMap<&'static str, f64>,
+    cause: Cause,
+    causes: Vec<Cause>,
     sensors: Vec<Sensor>,
     body: Body,
     tick_s: f64,
@@ -258,6 +354,9 @@ impl Watch {
             readers: None,
             failed: None,
             found: Vec::new(),
+            greatest: BTreeMap::new(),
+            cause: Cause::None,
+            causes: Vec::new(),
             sensors: mission.sensor_table(),
             body,
             tick_s: 1.0 / mission.robot.rate_hz,
@@ -294,6 +393,18 @@ impl Watch {
                 let off = DVec2::new(fix.x_m - pose.x_m, fix.y_m - pose.y_m);
                 let variance = of_place(&fix.covariance) + of_place(&pose.covariance);
                 self.find(Source::ScanFix, fix.stamp.tick, squared_over(off, variance));
+            }
+        }
+        while let Some(doubts) = readers.doubts.next_sample()? {
+            for (doubt, evidence) in doubts.each() {
+                let greatest = self.greatest.entry(doubt).or_default();
+                *greatest = greatest.max(evidence);
+            }
+        }
+        while let Some(link) = readers.link.next_sample()? {
+            let cause = link.cause();
+            if std::mem::replace(&mut self.cause, cause) != cause && FAULTS.contains(&cause) {
+                self.causes.push(cause);
             }
         }
         while let Some(slice) = readers.ranges.next_slice()? {

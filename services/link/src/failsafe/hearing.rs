@@ -69,6 +69,10 @@ impl Missing {
         self.sum >= least || self.is_in_motion()
     }
 
+    fn doubt(self, sure: f64) -> f64 {
+        if self.is_in_motion() { 1.0 } else { self.sum / sure }
+    }
+
     fn is_in_motion(self) -> bool {
         self.spells >= SPELLS
     }
@@ -215,6 +219,15 @@ impl Hearing {
                 memory.ends.add(memory.mean_ends, ENDS[1]);
             }
         }
+    }
+
+    /// Returns the greatest evidence of a deaf sensor; 1 is sure.
+    pub(super) fn doubt(&self) -> f64 {
+        let Memory { one, all, ends, silences, .. } = &self.memory;
+        let all = if one.len() > 1 { all.doubt(ALL[1]) } else { 0.0 };
+        let front = f64::from(*silences) / f64::from(SILENCES + 1);
+        let one = one.values().map(|missing| missing.doubt(ONE[1]));
+        one.fold(all.max(ends.doubt(ENDS[1])).max(front), f64::max)
     }
 
     /// Explains doubtful, or surely deaf, sensors.

@@ -6,7 +6,7 @@ use common::{
     clock::{MissionTime, Pace},
     driver::{Commander, LaserScan, counts::WheelCounts},
     mission::{Mission, Response},
-    samples::{Cause, CommandSample, HoldReason, Order, RangeReading},
+    samples::{Cause, CommandSample, DoubtsSample, HoldReason, Order, RangeReading},
 };
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -132,6 +132,11 @@ pub trait Monitor {
 
     /// Returns whether the condition of `cause`, one of its own, holds.
     fn condition(&self, cause: Cause, now: Moment) -> Condition;
+
+    /// Adds its evidence.
+    fn doubt(&self, doubts: &mut DoubtsSample) {
+        let _ = doubts;
+    }
 
     fn explain(&self, cause: Cause, now: Moment) -> Option<String> {
         let _ = (cause, now);

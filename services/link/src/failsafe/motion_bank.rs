@@ -117,6 +117,12 @@ impl<const N: usize> Bank<N> {
         }
     }
 
+    /// Returns the greatest share of a limit among some hypotheses.
+    pub(super) fn doubt(&self, of: impl Fn(Hypothesis) -> bool) -> f64 {
+        let rows = self.rows.iter().zip(&self.sums).filter(|((it, _), _)| of(*it));
+        rows.map(|((_, [_, sure]), sum)| sum / sure).fold(0.0, f64::max)
+    }
+
     /// Returns the hypothesis whose sum exceeds its limit most, and its onset, if any does.
     pub(super) fn likeliest(&self, sure: bool) -> Option<(Hypothesis, f64)> {
         let level = |it: &usize| self.sums[*it] / self.rows[*it].1[usize::from(sure)];

@@ -32,7 +32,7 @@ use common::{
     clock::MissionTime,
     driver::counts::WheelCounts,
     mission::{Mission, ModelledSpeed, Response},
-    samples::{Cause, Order},
+    samples::{Cause, DoubtsSample, Order},
 };
 
 use super::{
@@ -524,6 +524,17 @@ impl Monitor for Odometry {
             (_, None, Some(&jump)) => Condition::OverFor(now.time.since(jump)),
             (_, None, None) => false.into(),
         }
+    }
+
+    fn doubt(&self, doubts: &mut DoubtsSample) {
+        let seconds = |seconds: f64, of: Duration| seconds / of.as_secs_f64();
+        let [left, right, turn] = self
+            .evidence
+            .each_ref()
+            .map(|it| seconds(it.against_s, SUSPECTED_AFTER).max(seconds(it.still_s, STILL_AFTER)));
+        (doubts.left_wheel, doubts.right_wheel, doubts.turn) = (left, right, turn);
+        doubts.uncommanded = seconds(self.untold_s, UNTOLD_AFTER);
+        doubts.jumps = self.jumps.len() as f64 / MOST_JUMPS as f64;
     }
 
     fn explain(&self, cause: Cause, now: Moment) -> Option<String> {

@@ -19,7 +19,7 @@ use common::{
     driver::counts::WheelCounts,
     kinematics::Pose2,
     mission::{Body, Mission, Sensor, SensorKind},
-    samples::{Cause, RangeReading, RangeStatus},
+    samples::{Cause, DoubtsSample, RangeReading, RangeStatus},
 };
 
 use super::{
@@ -339,6 +339,20 @@ impl Monitor for Range {
         let least =
             self.rows.iter().try_fold(Duration::MAX, |least, row| Some(least.min(over_for(row)?)));
         least.map_or(Condition::Holds, Condition::OverFor)
+    }
+
+    fn doubt(&self, doubts: &mut DoubtsSample) {
+        if !self.sensing {
+            return;
+        }
+        for Row { past: Past { staying: [equal, near], odd_share, .. }, .. } in &self.rows {
+            let stuck = equal.motion(READINGS).max(near.motion(2 * READINGS) / SURE);
+            doubts.stuck = doubts.stuck.max(stuck);
+            doubts.inconsistent = doubts.inconsistent.max(odd_share / ODD_SHARES[1]);
+        }
+        doubts.deaf = self.hearing.doubt();
+        self.scans.iter().for_each(|scans| scans.doubt(doubts));
+        self.motion.doubt(doubts);
     }
 
     fn explain(&self, cause: Cause, _: Moment) -> Option<String> {

@@ -22,7 +22,7 @@ use std::collections::{BTreeMap, VecDeque};
 use common::{
     kinematics::Pose2,
     mission::{Mission, Sensor, SensorKind},
-    samples::{RangeReading, RangeStatus},
+    samples::{DoubtsSample, RangeReading, RangeStatus},
 };
 use glam::DVec2;
 
@@ -235,6 +235,13 @@ impl RangeMotion {
             (Rolls(share), since_s) => Some((share, since_s)),
             _ => None,
         }
+    }
+
+    pub(super) fn doubt(&self, doubts: &mut DoubtsSample) {
+        let [long, begun] = &self.better;
+        let is_late = |it| matches!(it, Late(_));
+        doubts.late_ranges = long.doubt(is_late).max(begun.doubt(is_late));
+        doubts.miscounted = long.doubt(|it| !is_late(it));
     }
 
     pub(super) fn judged(&self, sure: bool) -> Option<String> {

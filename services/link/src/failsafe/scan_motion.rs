@@ -7,7 +7,7 @@
 
 use std::collections::VecDeque;
 
-use common::{driver::LaserScan, kinematics::Pose2, mission::Sensor};
+use common::{driver::LaserScan, kinematics::Pose2, mission::Sensor, samples::DoubtsSample};
 use glam::DVec2;
 
 use super::motion_bank::{
@@ -112,6 +112,12 @@ impl ScanMotion {
         });
         let (sum, beams) = differences.fold((0.0, 0.0), |(sum, beams), it| (sum + it, beams + 1.0));
         if beams < LEAST_BEAMS { f64::NAN } else { sum / beams }
+    }
+
+    pub(super) fn doubt(&self, doubts: &mut DoubtsSample) {
+        let is_late = |it| matches!(it, Late(_));
+        doubts.late_scans = doubts.late_scans.max(self.better.doubt(is_late));
+        doubts.frozen_scans = doubts.frozen_scans.max(self.better.doubt(|it| !is_late(it)));
     }
 
     pub(super) fn judged(&self, sure: bool) -> Option<String> {
