@@ -87,6 +87,9 @@ pub struct Arguments {
     /// Directory of the tables.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Only record mission N of the seed, as `mission-N.mcap`.
+    #[arg(long, value_name = "N")]
+    record: Option<u64>,
     /// Number of missions at once; by default one per processor.
     #[arg(long)]
     jobs: Option<NonZero<usize>>,
@@ -128,6 +131,12 @@ pub fn main(arguments: &Arguments) -> Result {
     let Arguments { count, seed, .. } = *arguments;
     let directory = &arguments.out;
     std::fs::create_dir_all(directory).or_cannot_file("make", directory)?;
+    if let Some(number) = arguments.record {
+        let file = directory.join(format!("mission-{number}.mcap"));
+        let (robot, scenario) = draw(seed, number)?;
+        simulate::record(&scenario, &file)?;
+        return print_line(format!("{robot}, {}; see {}", scenario.mission.name, file.display()));
+    }
     let mut rows = csv::Writer::from_path(directory.join("residuals.csv"))?;
     rows.write_record(["mission", "robot", "residual", "tick", "value"])?;
     let mut all: BTreeMap<(&str, Source), Vec<f64>> = BTreeMap::new();

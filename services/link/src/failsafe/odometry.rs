@@ -206,9 +206,6 @@ pub struct Odometry {
     frame: Option<(WheelCounts, MissionTime)>,
     /// Of the left and the right wheel, and of their difference.
     evidence: [Evidence; 3],
-    /// Signs of the last commands to each; 0 before any. A base that stops driving sooner than
-    /// turning moves a wheel back without a command.
-    directions: [f64; 3],
     untold_s: f64,
     pub(crate) contacts: Contacts,
     jumps: VecDeque<MissionTime>,
@@ -238,11 +235,11 @@ impl Odometry {
         let [told_left, told_right] = counts.map(f64::from);
         let [left, right] = self.ask([told_left, told_right], now);
         let told = [told_left, told_right, told_right - told_left];
-        for (direction, told) in self.directions.iter_mut().zip(told).filter(|(_, it)| *it != 0.0) {
-            *direction = told.signum();
-        }
-        let [left, right, turn] = [(0, left), (1, right), (2, right - left)]
-            .map(|(of, reached)| if reached * self.directions[of] > 0.0 { reached } else { 0.0 });
+        // A base may stop sooner than its response states.
+        let [left, right, turn] = [(0, left), (1, right), (2, right - left)].map(|(of, reached)| {
+            let most = told[of].abs();
+            if reached * told[of] > 0.0 { reached.clamp(-most, most) } else { 0.0 }
+        });
         let mean = (left.abs() + right.abs()) / 2.0;
         let tells = turn.abs() >= LEAST_TURN_SHARE * mean;
         let asked = [left, right, if tells { turn } else { 0.0 }];
@@ -478,7 +475,6 @@ impl Monitor for Odometry {
             commanded: None,
             frame: None,
             evidence: Default::default(),
-            directions: [0.0; 3],
             untold_s: 0.0,
             contacts: Contacts::new(mission),
             jumps: VecDeque::new(),
