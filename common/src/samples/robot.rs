@@ -189,6 +189,8 @@ payloads! {
         late_scans: f64,
         /// Scans do not change although the wheels turn
         frozen_scans: f64,
+        /// Scans show another scale than the wheels
+        scaled_scans: f64,
         /// A reading stays although the robot moves
         stuck: f64,
         /// Readings do not follow from one another

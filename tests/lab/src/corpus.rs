@@ -147,8 +147,8 @@ pub fn main(arguments: &Arguments) -> Result {
     in_parallel((0..count).collect(), arguments.jobs, drive, |(number, driven)| {
         match driven {
             Ok((robot, Healthy { residuals, hours, greatest, causes })) => {
-                for cause in &causes {
-                    say(format_args!("mission {number}, {robot}: {}", cause.name()));
+                for (cause, doubt) in &causes {
+                    say(format_args!("mission {number}, {robot}: {} ({doubt})", cause.name()));
                 }
                 doubts.add(hours, &greatest, causes);
                 for Residual { source, tick, value } in residuals {
@@ -204,12 +204,17 @@ struct Doubts {
 }
 
 impl Doubts {
-    fn add(&mut self, hours: f64, greatest: &BTreeMap<&'static str, f64>, causes: Vec<Cause>) {
+    fn add(
+        &mut self,
+        hours: f64,
+        greatest: &BTreeMap<&'static str, f64>,
+        causes: Vec<(Cause, &'static str)>,
+    ) {
         self.hours += hours;
         for (doubt, evidence) in greatest {
             self.greatest.entry(doubt).or_default().push(*evidence);
         }
-        for cause in causes {
+        for (cause, _) in causes {
             *self.causes.entry(cause.name()).or_default() += 1;
         }
     }
@@ -254,8 +259,8 @@ struct Healthy {
     residuals: Vec<Residual>,
     hours: f64,
     greatest: BTreeMap<&'static str, f64>,
-    /// Causes that say that the robot is faulty.
-    causes: Vec<Cause>,
+    /// Causes that say that the robot is faulty, and its greatest doubt.
+    causes: Vec<(Cause, &'static str)>,
 }
 
 /// Drives a drawn mission. Returns the robot and what it shows.
@@ -341,7 +346,9 @@ struct Watch {
     found: Vec<Residual>,
     greatest: BTreeMap<&'static str, f64>,
     cause: Cause,
-    causes: Vec<Cause>,
+    /// Greatest doubt now.
+    doubt: &'static str,
+    causes: Vec<(Cause, &'static str)>,
     sensors: Vec<Sensor>,
     body: Body,
     tick_s: f64,
@@ -365,6 +372,7 @@ impl Watch {
             found: Vec::new(),
             greatest: BTreeMap::new(),
             cause: Cause::None,
+            doubt: "",
             causes: Vec::new(),
             sensors: mission.sensor_table(),
             body,
@@ -405,15 +413,18 @@ impl Watch {
             }
         }
         while let Some(doubts) = readers.doubts.next_sample()? {
-            for (doubt, evidence) in doubts.each() {
+            let doubts = doubts.each();
+            for (doubt, evidence) in &doubts {
                 let greatest = self.greatest.entry(doubt).or_default();
-                *greatest = greatest.max(evidence);
+                *greatest = greatest.max(*evidence);
             }
+            let greatest = doubts.iter().max_by(|(_, one), (_, other)| one.total_cmp(other));
+            self.doubt = greatest.map_or("", |(doubt, _)| doubt);
         }
         while let Some(link) = readers.link.next_sample()? {
             let cause = link.cause();
             if std::mem::replace(&mut self.cause, cause) != cause && FAULTS.contains(&cause) {
-                self.causes.push(cause);
+                self.causes.push((cause, self.doubt));
             }
         }
         while let Some(slice) = readers.ranges.next_slice()? {

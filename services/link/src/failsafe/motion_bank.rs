@@ -20,6 +20,10 @@ pub(super) enum Hypothesis {
     Late(f64),
     /// The robot rolls so far, relative to what its wheels count.
     Rolls(f64),
+    /// Ranges are distances times a factor.
+    Scaled(f64),
+    /// Ranges are longer than distances, metres.
+    Longer(f64),
 }
 
 impl Hypothesis {
@@ -33,6 +37,23 @@ impl Hypothesis {
                 let counted = [poses.at(from_s), poses.at(to_s)];
                 [counted[0], rolled(counted[0], counted, share)]
             }
+            _ => [poses.at(from_s), poses.at(to_s)],
+        }
+    }
+
+    pub(super) const fn distance(self, range_m: f64) -> f64 {
+        match self {
+            Self::Scaled(factor) => range_m / factor,
+            Self::Longer(by_m) => range_m - by_m,
+            _ => range_m,
+        }
+    }
+
+    pub(super) const fn range(self, distance_m: f64) -> f64 {
+        match self {
+            Self::Scaled(factor) => distance_m * factor,
+            Self::Longer(by_m) => distance_m + by_m,
+            _ => distance_m,
         }
     }
 
@@ -44,6 +65,12 @@ impl Hypothesis {
             Self::Rolls(0.0) => "do not change although the wheels turn; check the sensor, and whether the wheels slip".to_owned(),
             Self::Rolls(share) => format!(
                 "are consistent only if the robot rolls about {share} times as far as its wheels count; check encoders and wheels"
+            ),
+            Self::Scaled(factor) => format!(
+                "are consistent only if they are about {factor} times the distances; check the sensor and its unit"
+            ),
+            Self::Longer(by_m) => format!(
+                "are consistent only if they are about {by_m} m longer than the distances; check the sensor"
             ),
         };
         format!("the readings of {whose} {found}, then run `firsthand stop` and `resume`")
@@ -104,9 +131,9 @@ impl<const N: usize> Bank<N> {
         Self { rows, sums: [0.0; N], since_s: [0.0; N] }
     }
 
-    pub(super) fn fade(&mut self, left: f64) {
+    pub(super) fn fade(&mut self, hypothesis: usize, left: f64) {
         assert!((0.0..=1.0).contains(&left));
-        self.sums.iter_mut().for_each(|sum| *sum *= left);
+        self.sums[hypothesis] *= left;
     }
 
     pub(super) fn add(&mut self, hypothesis: usize, better: f64, at_s: f64) {

@@ -236,10 +236,11 @@ impl Odometry {
         let [left, right] = self.ask([told_left, told_right], now);
         let told = [told_left, told_right, told_right - told_left];
         // A base may stop sooner than its response states.
-        let [left, right, turn] = [(0, left), (1, right), (2, right - left)].map(|(of, reached)| {
-            let most = told[of].abs();
-            if reached * told[of] > 0.0 { reached.clamp(-most, most) } else { 0.0 }
-        });
+        let [left, right, turn] =
+            [(0, left), (1, right), (2, right - left)].map(|(of, reached)| {
+                let most = told[of].abs();
+                if reached * told[of] > 0.0 { reached.clamp(-most, most) } else { 0.0 }
+            });
         let mean = (left.abs() + right.abs()) / 2.0;
         let tells = turn.abs() >= LEAST_TURN_SHARE * mean;
         let asked = [left, right, if tells { turn } else { 0.0 }];
