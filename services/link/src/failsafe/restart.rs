@@ -4,8 +4,11 @@
 //! implausible. Later counts are compared with the last plausible ones, so one outdated frame has
 //! no effect.
 //!
-//! A driven wheel turns no farther than its command, its last speed or its reported speed allows.
+//! A driven wheel turns no farther than its recent commands, its last speed or its reported speed
+//! allow.
 //! Otherwise counts that restart within half a metre of the start would pass as motion.
+
+use std::collections::VecDeque;
 
 use common::{clock::MissionTime, driver::counts::WheelCounts, mission::Mission};
 
@@ -20,6 +23,9 @@ const PERIODS: f64 = 6.0;
 /// Consistent frames that make implausible counts accepted.
 const FOLLOW_EACH_OTHER: u32 = 3;
 
+/// Bound on kept commands.
+const MOST_KEPT: usize = 64;
+
 type Frame = (WheelCounts, MissionTime);
 
 #[derive(Clone, Debug, Default)]
@@ -27,8 +33,8 @@ pub struct RestartWatch {
     last: Option<Frame>,
     /// Reported and counted speeds at the last plausible counts, counts/s.
     turned: [[f64; 2]; 2],
-    commanded: [[f64; 2]; 2],
-    driven: Option<MissionTime>,
+    /// Recent commands, which the wheels may still follow.
+    commanded: VecDeque<(MissionTime, [f64; 2])>,
     /// Newest implausible counts, their time, and the number of consistent frames.
     suspected: Option<(Frame, u32)>,
     /// Whether the robot was lost since the last frame.
@@ -54,10 +60,10 @@ impl RestartWatch {
 
     /// Takes counts/s.
     pub fn commanded(&mut self, counts: [i16; 2], now: MissionTime) {
-        self.commanded = [self.commanded[1], counts.map(f64::from)];
-        if counts != [0, 0] {
-            self.driven = Some(now);
-        }
+        let is_old = |(at, _): &(MissionTime, _)| !self.is_recent(*at, now);
+        let old = self.commanded.iter().take_while(|it| is_old(it)).count();
+        self.commanded.drain(..old.max(self.commanded.len().saturating_sub(MOST_KEPT)));
+        self.commanded.push_back((now, counts.map(f64::from)));
     }
 
     /// Classifies counts with reported `speeds`, counts/s.
@@ -108,6 +114,10 @@ impl RestartWatch {
         Counts::Implausible
     }
 
+    fn is_recent(&self, at: MissionTime, now: MissionTime) -> bool {
+        now.since(at).as_secs_f64() <= PERIODS * self.jitter_s
+    }
+
     fn begin_at(&mut self, frame: Frame) {
         (self.last, self.suspected) = (Some(frame), None);
         self.restarts += 1;
@@ -125,18 +135,20 @@ impl RestartWatch {
     /// Returns the step relative to the most by known speeds times [`IMPLAUSIBLE`]; 0 if not
     /// driven.
     fn share_of_driven(&self, before: Frame, now: Frame, speeds: [f64; 2]) -> f64 {
-        let recent = |at: MissionTime| now.1.since(at).as_secs_f64() <= PERIODS * self.jitter_s;
-        if !recent(before.1) || !self.driven.is_some_and(recent) {
+        let told = || {
+            let recent = self.commanded.iter().filter(|(at, _)| self.is_recent(*at, now.1));
+            recent.map(|(_, told)| *told)
+        };
+        if !self.is_recent(before.1, now.1) || told().all(|told| told == [0.0; 2]) {
             return 0.0;
         }
         let (turned, gap_s) = since(before, now);
         let time = gap_s + self.jitter_s;
         let share = |wheel: usize| {
             let counts = turned[wheel];
-            let known =
-                [self.commanded[0], self.commanded[1], self.turned[0], self.turned[1], speeds];
+            let known = told().chain(self.turned).chain([speeds]);
             let along = known.map(|speeds| speeds[wheel] * counts.signum());
-            let reach = along.into_iter().fold(0.0, f64::max) * time + self.slack / IMPLAUSIBLE;
+            let reach = along.fold(0.0, f64::max) * time + self.slack / IMPLAUSIBLE;
             counts.abs() / reach
         };
         share(0).max(share(1))
@@ -243,6 +255,16 @@ mod tests {
             }
             assert_eq!(watch.at(715, [384 + step; 2]), want, "{step}");
         }
+    }
+
+    #[test]
+    fn wheels_that_still_follow_the_command_before_a_stop_are_plausible() {
+        let mut watch = watch();
+        watch.at(0, [0, 0]);
+        for (ms, told) in [(0, 674), (50, 0), (100, 0)] {
+            watch.commanded([told; 2], at(ms));
+        }
+        assert_eq!(watch.at(143, [200, 200]), Follow);
     }
 
     #[test]
