@@ -88,24 +88,27 @@ impl RestartWatch {
             self.last = Some(frame);
             return Counts::Follow;
         };
-        let share =
-            self.share_of_reach(before, frame).max(self.share_of_driven(before, frame, speeds));
+        let share_since =
+            |then| self.share_of_reach(then, frame).max(self.share_of_driven(then, frame, speeds));
+        let share = share_since(before);
         assert!(share >= 0.0);
         if frame.0.restarted_since(before.0) && (away || share > 1.0) {
             self.begin_at(frame);
             return Counts::Restarted { was_away };
         }
-        if share <= IMPLAUSIBLE {
+        // The longer ago the last counts, the more would follow them.
+        let suspected = self.suspected.map(|(then, following)| (share_since(then), following));
+        if share <= IMPLAUSIBLE && suspected.is_none_or(|(other, _)| share <= other) {
             (self.last, self.suspected) = (Some(frame), None);
             let (turned, gap_s) = since(before, frame);
             let gap_s = gap_s.max(self.jitter_s);
             self.turned = [speeds, turned.map(|turned| turned / gap_s)];
             return Counts::Follow;
         }
-        let following = self.suspected.map_or(1, |(suspected, following)| {
-            let follows = self.share_of_reach(suspected, frame) <= IMPLAUSIBLE;
-            if follows { following + 1 } else { 1 }
-        });
+        let following = match suspected {
+            Some((share, following)) if share <= IMPLAUSIBLE => following + 1,
+            _ => 1,
+        };
         if following >= FOLLOW_EACH_OTHER {
             self.begin_at(frame);
             return Counts::Elsewhere;

@@ -49,6 +49,9 @@ const MOST_CORNER: f64 = 0.05;
 /// missions of `firsthand-lab corpus` the sums led wheels at most 0.031 m apart.
 const RECENT: usize = 24;
 const LEAST_UNTOLD_M: f64 = 0.01;
+/// Least excess of a tick's travel over that of both ticks beside it, beyond any such excess of the
+/// commands, metres. In 99 of 100 missions of the corpus it stayed below.
+const LEAST_SPIKE_M: f64 = 0.05;
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
@@ -120,21 +123,31 @@ struct Untold {
     way_m: [f64; 2],
 }
 
+/// Returns how far the middle value lies outside of the others.
+fn spike([before, it, after]: [f64; 3]) -> f64 {
+    it - it.max(before.min(after)).min(before.max(after))
+}
+
 impl Untold {
     fn take(&mut self, tick: [[f64; 2]; 2]) {
         self.recent.push_back(tick);
         if self.recent.len() > RECENT {
             self.recent.pop_front();
         }
-        let [.., before, judged, after] = self.recent.make_contiguous() else { return };
+        let recent = &*self.recent.make_contiguous();
+        let [.., before, judged, after] = recent else { return };
         let [before, judged, after] = [before, judged, after].map(|[_, counted]| *counted);
         for (wheel, way_m) in self.way_m.iter_mut().enumerate() {
-            let told = self.recent.iter().map(|[told, _]| told[wheel]);
+            let told = recent.iter().map(|[told, _]| told[wheel]);
             let [least, most] = [f64::min, f64::max]
                 .map(|of| told.clone().fold(of(before[wheel], after[wheel]), of));
             let untold_m = judged[wheel] - judged[wheel].max(least).min(most);
-            if untold_m.abs() > LEAST_UNTOLD_M {
-                *way_m += untold_m;
+            let spike_m = spike([before, judged, after].map(|counted| counted[wheel]));
+            let told_m =
+                recent.windows(3).map(|it| spike([0, 1, 2].map(|at| it[at][0][wheel])).abs());
+            let is_spike = spike_m.abs() > LEAST_SPIKE_M + told_m.fold(0.0, f64::max);
+            if is_spike || untold_m.abs() > LEAST_UNTOLD_M {
+                *way_m += if is_spike { spike_m } else { untold_m };
             }
         }
     }
