@@ -86,8 +86,8 @@ topics! {
     COUNTS "counts": CountsSample, "link", Rate::WhenItHappens;
     /// Identified response of the base, in each tick, if it stops later than the mission states.
     BASE_RESPONSE "base_response": BaseResponseSample, "link", Rate::WhenItHappens;
-    /// Evidence of the link against a healthy robot.
-    DOUBTS "doubts": DoubtsSample, "link", Rate::EachTick;
+    /// Evidence of the link against a healthy robot, in each tick that changes it.
+    DOUBTS "doubts": DoubtsSample, "link", Rate::WhenItHappens;
     /// Location of a contact: wheels are blocked despite a command, or a bumper or cliff sensor is
     /// active.
     CONTACT "contact": ContactSample, "link", Rate::WhenItHappens;

@@ -152,7 +152,7 @@ rules! {
     RangeSilent, Stop, streams, WithCondition, Some(|mission| mission.robot.silent_after_s()),
         "a sensor that the mission uses has given no valid reading for three times `robot.command_limit_s`; `link.log` names it. A single infrared ranger may only slow the robot. \"Nothing in range\" is a valid reading";
     RangeImplausible, Stop, range, OnResume { or_after: Some(range::CHANGES) }, Some(range::known_within_s),
-        "one of five signs; `link.log` names the sensor. The front sonar stays within 1 cm to either side while the robot drives 0.4 m or turns by 90 degrees. Another sensor does so while the robot turns by 90 degrees on the spot. For a band of 7 cm, 1.8 times that motion is needed. Two of three readings do not follow from those before. Scans, or readings of sonars and infrared rangers, change as if they were 0.3 s late or more, or scans as if the robot stood. More than 4 times in a row, the front sonar hears nothing of a surface nearer than 0.45 m that the two infrared rangers beside it see within 12 degrees of square. No sensor reads anything while readings at the end of the infrared rangers' scale are due";
+        "one of five signs; `link.log` names the sensor. The front sonar stays within 1 cm to either side while the robot drives 0.4 m or turns by 90 degrees. Another sensor does so while the robot turns by 90 degrees on the spot. For a band of 7 cm, 1.8 times that motion is needed. Most readings do not follow from those before. Readings or scans are consistent only if they are late, if scans have another scale, or if the robot rolls another distance than its wheels count. More than 4 times in a row, the front sonar hears nothing of a surface nearer than 0.45 m that the two infrared rangers beside it see within 12 degrees of square. No sensor reads anything while readings at the end of the infrared rangers' scale are due";
     CommandStale, Stop, staleness, WithCondition, LIMIT,
         "the newest command's tick began more than `robot.command_limit_s` ago, or no command exists";
     PoseStale, Stop, staleness, WithCondition, LIMIT,
@@ -160,7 +160,7 @@ rules! {
     GuidanceStale, Stop, staleness, WithCondition, LIMIT,
         "the command follows guidance older than `robot.command_limit_s`";
     RangeDoubtful, Slow, range, After(range::CHANGES), None,
-        "half the evidence that makes a ranging sensor implausible, or no sensor reads anything over a drive as long as their reach; `link.log` names the sensor. Slow driving shows whether the sensor is faulty";
+        "half to two thirds of the evidence that makes a ranging sensor implausible, or no sensor reads anything over a drive as long as their reach; `link.log` names the sensor. Slow driving shows whether the sensor is faulty";
     InfraredSilent, Slow, streams, WithCondition, None,
         "one infrared ranger has given no valid reading for three times `robot.command_limit_s`; `link.log` names it. It looks to the side or back, or into the cone of a sonar that the mission uses";
     BaseSlow, Slow, base, WithCondition, None,

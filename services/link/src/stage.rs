@@ -4,8 +4,8 @@ use common::{
     mission::{Mission, SensorKind},
     outputs::Outputs,
     samples::{
-        Direction, InfraredSample, PowerSample, RangesHeader, ScanHeader, SurroundingsSample,
-        WireHeader,
+        Direction, DoubtsSample, InfraredSample, PowerSample, RangesHeader, ScanHeader,
+        SurroundingsSample, WireHeader,
     },
     shell::{Context, Progress},
     stage::{ForeignState, Stage},
@@ -26,6 +26,7 @@ pub struct LinkStage {
     infrared: Option<InfraredSample>,
     power: Option<PowerSample>,
     surroundings: Option<SurroundingsSample>,
+    doubts: DoubtsSample,
     /// Unpublished bytes, oldest first.
     wire: Vec<(Progress, WireHeader, Vec<u8>)>,
 }
@@ -78,7 +79,9 @@ impl LinkStage {
                 out.publish_slice(&RANGES, RangesHeader::default(), &ranges)?;
                 out.publish(&COUNTS, endless)?;
                 out.publish(&WHEELS, wheels)?;
-                out.publish(&DOUBTS, self.link.doubts())?;
+                let doubts = self.link.doubts();
+                let is_new = std::mem::replace(&mut self.doubts, doubts) != doubts;
+                out.publish(&DOUBTS, is_new.then_some(doubts))?;
             }
             Effect::Infrared(sample) => self.infrared = Some(sample),
             Effect::Power(sample) => self.power = Some(sample),
@@ -114,6 +117,7 @@ impl Stage for LinkStage {
             infrared: None,
             power: None,
             surroundings: None,
+            doubts: DoubtsSample::default(),
             wire: Vec::new(),
         }
     }

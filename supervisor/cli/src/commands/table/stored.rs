@@ -18,6 +18,7 @@ static RESULTS: &[(&str, &str)] = stored! {
     "claims" in "claims.csv",
     "stop-times" in "stop_times.csv",
     "corpus" in "corpus.csv",
+    "doubts" in "doubts.csv",
     "seeds" in "seeds.csv",
     "tick" in "tick.csv",
     "tick-at-7-hz" in "tick_at_7_hz.csv",
