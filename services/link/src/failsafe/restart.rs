@@ -16,6 +16,8 @@ use super::monitor::Counts;
 
 /// Largest plausible multiple of the travel at top speed.
 const IMPLAUSIBLE: f64 = 1.5;
+/// The same for counts that other, suspected ones explain too.
+const SURELY_FOLLOWS: f64 = 1.0;
 /// Slack beyond known speeds, metres: acceleration adds hardly more in a tick.
 const SLACK_M: f64 = 0.06;
 /// Periods in which a command bounds the motion.
@@ -88,27 +90,27 @@ impl RestartWatch {
             self.last = Some(frame);
             return Counts::Follow;
         };
-        let share_since =
-            |then| self.share_of_reach(then, frame).max(self.share_of_driven(then, frame, speeds));
-        let share = share_since(before);
+        let share =
+            self.share_of_reach(before, frame).max(self.share_of_driven(before, frame, speeds));
         assert!(share >= 0.0);
         if frame.0.restarted_since(before.0) && (away || share > 1.0) {
             self.begin_at(frame);
             return Counts::Restarted { was_away };
         }
+        let follows = |(then, following)| {
+            (self.share_of_reach(then, frame) <= IMPLAUSIBLE).then_some(following)
+        };
+        let following = self.suspected.and_then(follows);
         // The longer ago the last counts, the more would follow them.
-        let suspected = self.suspected.map(|(then, following)| (share_since(then), following));
-        if share <= IMPLAUSIBLE && suspected.is_none_or(|(other, _)| share <= other) {
+        let most = if following.is_some() { SURELY_FOLLOWS } else { IMPLAUSIBLE };
+        if share <= most {
             (self.last, self.suspected) = (Some(frame), None);
             let (turned, gap_s) = since(before, frame);
             let gap_s = gap_s.max(self.jitter_s);
             self.turned = [speeds, turned.map(|turned| turned / gap_s)];
             return Counts::Follow;
         }
-        let following = match suspected {
-            Some((share, following)) if share <= IMPLAUSIBLE => following + 1,
-            _ => 1,
-        };
+        let following = following.map_or(1, |following| following + 1);
         if following >= FOLLOW_EACH_OTHER {
             self.begin_at(frame);
             return Counts::Elsewhere;
