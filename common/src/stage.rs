@@ -16,16 +16,6 @@
 //! becomes an entry: clock readings (of the link), results of other threads (the planner's
 //! background solve), a random seed (the mission's).
 //!
-//! # Stages
-//!
-//! | stage | entry | output | state |
-//! |---|---|---|---|
-//! | `link` | datagram, open or closed wire, command, directive, passing time | datagrams, samples, decisions | counts of a robot that does not count itself |
-//! | `dead-reckoning` | wheel counts | pose | pose and the counts it was computed at |
-//! | `mapper` | pose with range, reset, fault | the window of the grid that changed | the whole belief |
-//! | `planner` | grid part, pose, solved job, fault | guidance, job for the background solver | none: the next keyframe has all |
-//! | `controller` | guidance | command | none |
-//!
 //! # Adding a stage
 //! The guide's page `add-a-stage.md` adds one, an odometer.
 

@@ -4,7 +4,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    bus::{Kind, Layout as _, Value, ZeroCopySend},
+    bus::{Field, Kind, Layout as _, Value, ZeroCopySend},
     latency,
     mission::{INFRARED_RANGERS, Sensor, wire_enum},
 };
@@ -103,21 +103,16 @@ impl Sweep {
 }
 
 impl DoubtsSample {
-    /// Returns each doubt's name and evidence.
-    pub fn each(&self) -> Vec<(&'static str, f64)> {
-        let Value::Struct(fields) = self.value() else { return Vec::new() };
-        let evidence = |(name, value)| match value {
-            Value::Double(evidence) => Some((name, evidence)),
+    /// Returns each doubt's name, meaning and evidence.
+    pub fn each(&self) -> Vec<(&'static str, &'static str, f64)> {
+        let (Kind::Struct(structure), Value::Struct(values)) = (Self::kind(), self.value()) else {
+            return Vec::new();
+        };
+        let doubt = |(field, (name, value)): (Field, _)| match value {
+            Value::Double(evidence) => Some((name, field.doc.trim(), evidence)),
             _ => None,
         };
-        fields.into_iter().filter_map(evidence).collect()
-    }
-
-    /// Returns each doubt's name and meaning, in the order of [`Self::each`].
-    pub fn meanings() -> Vec<(&'static str, &'static str)> {
-        let Kind::Struct(structure) = Self::kind() else { return Vec::new() };
-        let doubts = structure.fields.into_iter().filter(|it| matches!(it.kind, Kind::Number(_)));
-        doubts.map(|doubt| (doubt.name, doubt.doc.trim())).collect()
+        structure.fields.into_iter().zip(values).filter_map(doubt).collect()
     }
 }
 

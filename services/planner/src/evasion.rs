@@ -5,12 +5,12 @@
 //! constant velocity. Proximity to a mover is a danger that fades with time.
 //!
 //! Advice without danger is followed. Otherwise the robot begins the path with the greatest gain
-//! along the field minus danger, so it steps aside early. It moves only if it could brake after the
-//! next tick and rest before any contact, or if the whole path is free.
+//! along the field minus danger. It moves only if it could brake after the next tick and rest before
+//! any contact, or if the whole path is free.
 //!
-//! A robot hindered for long insists on its way. Otherwise, people who give way would make it stand
-//! and back off until its time ends. It still moves only where it could rest in time. It evades
-//! again for its next target, or once nothing has moved near it for as long.
+//! A robot hindered for long insists on its way, because people who give way would make it stand
+//! until its time ends. It evades again for its next target, or once nothing has moved near it for
+//! as long.
 
 use std::f64::consts::{PI, TAU};
 

@@ -4,13 +4,11 @@
 //! reflects only at the foot of the perpendicular, within a limit off the axis. A drum reflects
 //! over a wider angle, an edge sometimes. Silent surfaces still hide those behind them.
 //!
-//! An echo is detected if its amplitude reaches a threshold. The amplitude falls with range r as
-//! 10^(-2 alpha r / 20) / r: the transmitter's mirror image in a plane is 2 r away. Air at 40 kHz
-//! absorbs alpha = 1.3 dB/m (ISO 9613-1, 20 degrees Celsius, half saturated). A cylinder of radius
-//! a adds sqrt(a / (a + r)). It returns a wave front of radius r with radius a r / (a + 2 r) in the
-//! level plane. This geometrical acoustics needs k a well above 1; a post of 1.25 cm has k a = 9. A
-//! soft surface returns its share `echo`. The threshold is the amplitude of a post 3 cm in diameter
-//! at `post_reach_m`, so walls are detected far beyond [`REACH_M`].
+//! An echo is detected if its amplitude reaches that of a post 3 cm in diameter at `post_reach_m`.
+//! The amplitude falls with range r as 10^(-2 alpha r / 20) / r: the transmitter's mirror image in a
+//! plane is 2 r away. Air at 40 kHz absorbs alpha = 1.3 dB/m (ISO 9613-1, 20 degrees Celsius, half
+//! saturated). A cylinder of radius a adds sqrt(a / (a + r)). This geometrical acoustics needs k a
+//! well above 1; a post of 1.25 cm has k a = 9. A soft surface returns its share `echo`.
 //!
 //! The cone is as wide vertically as horizontally, so it meets solids below or above the ranger
 //! from some distance on. A smooth one then echoes only by its edge.

@@ -38,10 +38,6 @@
 //!     let pose = pose?;
 //!     println!("{:.3} {:.3}", pose.sample.x_m, pose.sample.y_m);
 //! }
-//! for grid in recording.slices(&topics::GRID)? {
-//!     let grid = grid?;
-//!     println!("version {}: {} cells", grid.header.part.version, grid.elements.len());
-//! }
 //! # Ok::<(), recording::RecordingError>(())
 //! ```
 

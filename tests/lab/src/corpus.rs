@@ -414,12 +414,12 @@ impl Watch {
         }
         while let Some(doubts) = readers.doubts.next_sample()? {
             let doubts = doubts.each();
-            for (doubt, evidence) in &doubts {
+            for (doubt, _, evidence) in &doubts {
                 let greatest = self.greatest.entry(doubt).or_default();
                 *greatest = greatest.max(*evidence);
             }
-            let greatest = doubts.iter().max_by(|(_, one), (_, other)| one.total_cmp(other));
-            self.doubt = greatest.map_or("", |(doubt, _)| doubt);
+            let greatest = doubts.iter().max_by(|(.., one), (.., other)| one.total_cmp(other));
+            self.doubt = greatest.map_or("", |(doubt, ..)| doubt);
         }
         while let Some(link) = readers.link.next_sample()? {
             let cause = link.cause();

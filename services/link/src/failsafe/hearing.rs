@@ -1,19 +1,15 @@
 //! Detection of sensors that do not hear what is there. "Nothing in range" is also normal in the
 //! open, so something else has to say what a silent sensor should have heard:
 //!
-//! - Earlier [`Echoes`]: a surface that was heard is still there. In 450 missions with one, three
-//!   and six sonars, the likelihoods of misses up to the next reading added up to 7.9 for one
-//!   sonar, and to 3.2 while all of several were silent. In 6 missions in which three sonars fell
-//!   deaf before drums, they reached 20 to 45.
+//! - Earlier [`Echoes`]: a surface that was heard is still there. In 450 missions the sums of missed
+//!   echoes reached 7.9 for one sonar, and 3.2 while all were silent; with deaf sonars 20 to 45.
 //! - Infrared rangers beside the front sonar: it must hear a near surface seen on both sides whose
-//!   line of hits is square to its axis. Even a smooth wall answers within 20 degrees of its
-//!   normal.
+//!   line of hits is square to its axis.
 //! - Noise: with nothing in reach, infrared rangers still read the end of their scale in a quarter
-//!   of the frames. In 107 recorded missions of robots with seven rangers, some with moving things
-//!   and harsh noise, two successive frames were never empty.
+//!   of the frames.
 //!
-//! Without any of them, deafness looks like an empty hall, which a robot must cross. It then goes
-//! slowly once it has driven the reach of its sensors without a reading.
+//! Otherwise deafness looks like an empty hall, which a robot must cross. It then goes slowly once
+//! it has driven the reach of its sensors without a reading.
 
 use std::collections::BTreeMap;
 
@@ -36,14 +32,14 @@ const END_SHARE: f64 = 0.85;
 const LEAST_ENDS: f64 = 1.0;
 /// Averaging length, frames.
 const MEAN_OF: f64 = 30.0;
-/// Spells of certain deafness, each ended by a reading, that show sensors deaf in motion.
+/// Spells of certain deafness that show sensors deaf in motion.
 const SPELLS: u32 = 3;
 /// Largest range of a surface between two rangers, metres, angle between its normal and the axis,
 /// and angle from the axis of rangers that look into the cone, degrees.
 const NEARER_M: f64 = 0.45;
 const SQUARE_DEG: f64 = 12.0;
 const BESIDE_DEG: f64 = 15.0;
-/// Silent readings that may be chance: healthy sonars give runs of four.
+/// Silent readings that may be chance.
 const SILENCES: u32 = 4;
 
 /// Sum of readings due during a silence.

@@ -1,27 +1,21 @@
 //! Odometry monitor: checks that the encoders follow the commands.
 //!
 //! A frame interval is evidence if the wheel's command, at [`LEAST_M_S`] or more, kept its sign for
-//! the settling time of the response. Commands count as far as the base's acceleration has reached
-//! them. The wheel must roll [`LEAST_SHARE`] of the smaller of the two newest commands; real wheels
-//! roll 0.75 to 0.8. Intervals over two periods are no evidence, because commands may have been
-//! lost.
+//! the settling time of the response. The wheel must roll [`LEAST_SHARE`] of what the base's
+//! acceleration has reached of the newest two commands; real wheels roll 0.75 to 0.8. In intervals
+//! over two periods, commands may have been lost.
 //!
 //! Each wheel and their difference are checked, because swapped wheels turn the robot the wrong
 //! way. Evidence against one adds up; evidence for it counts down at most twice as fast. Opposite
-//! motion counts twice, once a wheel could have reversed: a robot that turns away from its target
-//! gets a new direction every other tick. At [`SUSPECTED_AFTER`] the robot must stand: an X80 at 7
-//! Hz 0.86 s after a motion began, and at rest 0.2 s later.
+//! motion counts twice, once a wheel could have reversed. At [`SUSPECTED_AFTER`] the robot must
+//! stand. Until it does, [`super::response_fit`] looks for a response that explains the motion.
 //!
-//! Until the robot stands, [`super::response_fit`] looks for a response that explains the motion.
-//! If found, it replaces the stated one, and the link's log names it.
-//!
-//! A commanded wheel without counts is suspected after [`STILL_AFTER`]. A controller whose pose
-//! turns the wrong way changes direction too often for the other evidence. With a held motor's
+//! A commanded wheel without counts is suspected after [`STILL_AFTER`], because a controller whose
+//! pose turns the wrong way changes direction too often for the other evidence. With a held motor's
 //! current the wheel counts as held instead ([`super::contact`]).
 //!
 //! Motion is uncommanded if a wheel or the difference exceeds every recent command by
-//! [`LEAST_TURN_M_S`] plus a quarter of the wheels' speed. At [`UNTOLD_AFTER`] another host may
-//! command it.
+//! [`LEAST_TURN_M_S`] plus a quarter of the wheels' speed, for [`UNTOLD_AFTER`].
 //!
 //! Single impossible counts are dropped ([`super::restart`]); [`MOST_JUMPS`] within
 //! [`JUMPS_WITHIN`] are suspect too.
@@ -53,10 +47,9 @@ const LEAST_SHARE: f64 = 0.25;
 const ROLLS_SHARE: f64 = 0.5;
 /// Evidence that raises a suspicion. A radio that delivers frames loses commands for less time.
 pub(crate) const SUSPECTED_AFTER: Duration = Duration::from_millis(550);
-/// Time without counts that raises a suspicion. Commands may be lost for less.
+/// Time without counts that raises a suspicion.
 pub(crate) const STILL_AFTER: Duration = Duration::from_millis(1000);
-/// Time of uncommanded motion that raises a suspicion. A held wheel turns the body briefly, and is
-/// suspected sooner.
+/// Time of uncommanded motion that raises a suspicion.
 pub(crate) const UNTOLD_AFTER: Duration = Duration::from_millis(1000);
 /// Time before a suspicion that holds its evidence, and after it within which a base stops.
 const JUDGED: Duration = Duration::from_millis(1500);
@@ -64,8 +57,7 @@ pub(crate) const MOST_JUMPS: usize = 3;
 pub(crate) const JUMPS_WITHIN: Duration = Duration::from_secs(2);
 /// Time without jumps that ends a jump suspicion.
 pub(crate) const CALM: Duration = Duration::from_secs(2);
-/// Limit on jump suspicions that end by themselves. A faulty robot's counts may jump only in
-/// motion.
+/// Jump suspicions that end by themselves.
 const MOST_RECOVERIES: u32 = 2;
 /// Stopping-distance ratios of an unchanged response. A new one makes planner and controller forget
 /// unanswered commands.

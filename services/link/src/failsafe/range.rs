@@ -1,12 +1,11 @@
 //! Range monitor: checks that readings change with motion. [`super::hearing`] judges what sensors do
-//! not hear, [`super::range_motion`] and [`super::scan_motion`] how late they are.
+//! not hear, [`super::range_motion`] and [`super::scan_motion`] whether readings fit the motion.
 //!
-//! A constant reading in motion is stuck, because surfaces come nearer, and turns show other
-//! surfaces. In 240 recorded missions at least [`READINGS`] readings equal to the centimetre came
-//! with at most 0.53 of the required motion. Readings within 7 cm ([`BANDS_M`]) came with all of it
-//! in 3 of 180 others, so the robot slows first. For sensors that look aside only turns on the spot
-//! count, because walls read constant. Readings of nothing are exempt, because they last long in
-//! the open and before smooth slanted walls.
+//! A constant reading in motion is stuck. In 240 recorded missions at least [`READINGS`] readings
+//! equal to the centimetre came with at most 0.53 of the required motion. Readings within 7 cm
+//! ([`BANDS_M`]) came with all of it in 3 of 180 others, so the robot slows first. For sensors that
+//! look aside only turns on the spot count, because walls read constant. Readings of nothing are
+//! exempt.
 //!
 //! Readings must also follow from one another while the robot hardly turns. Healthy sensors break
 //! this in up to 0.45 of readings for long, random ones in 0.7 to 0.9. Page's test tells them apart.
@@ -32,7 +31,7 @@ use super::{
 /// Spread of stuck readings, metres: a centimetre to either side plus rounding, and a stuck
 /// sensor's noise.
 const BANDS_M: [f64; 2] = [0.0202, 0.0702];
-/// Least stuck readings, 1.1 s at 7 Hz; fewer may be chance.
+/// Least stuck readings, 1.1 s at 7 Hz.
 const READINGS: u32 = 8;
 /// Distance, metres, or turn, radians, that must change a reading. Fractions add up.
 const WAY_M: f64 = 0.4;

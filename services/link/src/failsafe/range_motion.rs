@@ -1,21 +1,15 @@
-//! Detection of sonar and infrared readings that are later than they say.
+//! Detection of sonar and infrared readings that contradict the wheels' motion.
 //!
-//! Late readings are placed by the robot's present pose. At constant speed and turn rate this
-//! shifts all hits alike. After the robot turns or slows, or the lag begins, hits of one surface
-//! disagree. Each hit is compared with those of the last seconds, as prompt and with each of
-//! several delays. The monitor sums how much nearer another delay brings them. A sonar's surface
-//! may lie anywhere on its arc, so its range is compared.
+//! Each hypothesis places the hits of the last seconds by its own poses, and the monitor sums how
+//! much nearer it brings hits of one surface. A sonar's surface may lie anywhere on its arc, so its
+//! range is compared.
 //!
-//! A lag that begins is compared with hits that were still prompt. Then all readings jump back to
-//! those of some time ago. Without a jump the comparison proves nothing: a wall that the robot
-//! passes at a small angle, or a person who walks ahead, reads the same as some time ago.
+//! At constant speed a lag shifts all hits alike. Only a turn, a change of speed, or its beginning
+//! shows it. When a lag begins, all readings jump back to those of some time ago. They are compared
+//! with prompt hits only after such a jump, because a wall beside the robot, or a person who walks
+//! ahead, also reads the same as before.
 //!
-//! A delay's sums change only while the robot moved that long ago, because a wall beside a starting
-//! robot looks like a late view from rest. A sure verdict holds until the operator resumes, so that
-//! a late robot keeps standing.
-//!
-//! In 400 healthy missions, drawn as `firsthand-lab corpus` draws them, the sums reached 1.9 for a
-//! lag as old as the hits, and 2.7 for one that began.
+//! A sure verdict holds until the operator resumes.
 
 use std::collections::{BTreeMap, VecDeque};
 

@@ -18,13 +18,11 @@ const BEFORE_S: f64 = 2.0;
 const MOST_KEPT: usize = 512;
 const DEAD_TIMES: u32 = 21;
 pub(super) const DEAD_TIME_STEP_S: f64 = 0.05;
-/// Acceleration grid: [`ACCELERATIONS`] entries at a ratio of [`ACCELERATION_RATIO`], then
-/// infinite. The slowest is a heavy base that a person pushes in vain.
+/// Acceleration grid, and then infinite. The slowest is a heavy base that a person pushes in vain.
 const LEAST_ACCELERATION_M_S2: f64 = 0.15;
 pub(super) const ACCELERATION_RATIO: f64 = 1.25;
 const ACCELERATIONS: i32 = 16;
-/// Scale of the turn grid, per wheel: the slowest is a narrow, heavy base. At 4.5 grid steps lower,
-/// no entry equals single wheels.
+/// Scale of the turn grid, per wheel. At 4.5 grid steps lower, no entry equals single wheels.
 const TURN_SHARE: f64 = 0.366;
 /// Least squared correlation of travel and model.
 const EXPLAINED: f64 = 0.8;
@@ -32,7 +30,7 @@ const EXPLAINED: f64 = 0.8;
 const FACTORS: std::ops::RangeInclusive<f64> = 0.5..=1.5;
 /// Least modelled travel that is evidence, metres.
 const LEAST_M: f64 = 0.04;
-/// Largest unexplained share of judged motion, in squared counts.
+/// Largest unexplained share of judged motion.
 const UNEXPLAINED: f64 = 0.25;
 
 /// Grid of added delay. In 240 recorded missions of robots as stated it found none.

@@ -1,17 +1,12 @@
 //! Ratio of the wheels' counted shares of their commanded travel, right over left.
 //!
-//! Slow speed loops fall short alike, and commands keep their curve ([`crate::speed_trim`]).
 //! Unequal shares show a wrong encoder, loop or ground. Which one is unknown, so dead reckoning
 //! takes the ratio as uncertainty of the curve.
 //!
-//! With modelled travel x and counted travel y, the ratio is y/x of the right wheel over that of
-//! the left. Least squares of `y_right x_left` over `y_left x_right` cancel common errors, such as
-//! a late frame. Early or late wheels shift the ratio while the curve changes, so the fit includes
-//! that change. A steadily narrowing curve confuses the two, so the ratio nearer to 1 counts, from
-//! the fits with and without the change.
-//!
-//! Accelerating wheels start before a model with one dead time does, and the next ticks cancel
-//! that. Such ticks count together or not at all.
+//! Least squares of `y_right x_left` over `y_left x_right`, with modelled travel x and counted
+//! travel y, cancel common errors such as a late frame. Early or late wheels shift the ratio while
+//! the curve changes, so the fit includes that change. A steadily narrowing curve confuses the two,
+//! so the ratio nearer to 1 counts, from the fits with and without the change.
 //!
 //! A tick's travel outside of that of the ticks beside it and of all recent commands is a jump of
 //! the counts, or the robot was moved. Dead reckoning takes it as uncertainty too.

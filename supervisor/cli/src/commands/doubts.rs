@@ -69,9 +69,10 @@ pub fn main(arguments: &Arguments) -> Result {
             runs.display()
         )
     })?;
-    let mut doubts: Vec<Doubt> = DoubtsSample::meanings()
+    let mut doubts: Vec<Doubt> = DoubtsSample::default()
+        .each()
         .into_iter()
-        .map(|(doubt, meaning)| Doubt {
+        .map(|(doubt, meaning, _)| Doubt {
             doubt,
             meaning,
             greatest: 0.0,
@@ -84,7 +85,7 @@ pub fn main(arguments: &Arguments) -> Result {
         let sample = sample?.sample;
         let at_s = sample.stamp.seconds();
         end_s = end_s.max(at_s);
-        for (doubt, (_, evidence)) in doubts.iter_mut().zip(sample.each()) {
+        for (doubt, (.., evidence)) in doubts.iter_mut().zip(sample.each()) {
             if evidence > doubt.greatest {
                 (doubt.greatest, doubt.at_s) = (evidence, at_s);
             }
