@@ -218,6 +218,20 @@ pub fn newest(runs: &Path, robot: &RobotName) -> Option<RunDirectory> {
     runs_of(robot, runs).into_iter().max()
 }
 
+/// Returns the directory of the robot's current run, or of its newest below `runs`.
+///
+/// # Errors
+/// Fails if it has none.
+pub fn current_or_newest(runs: &Path, robot: &RobotName) -> Result<PathBuf> {
+    let newest = || Some(newest(runs, robot)?.directory);
+    Ok(Robot::find(robot.clone()).run.or_else(newest).ok_or_else(|| {
+        format!(
+            "robot {robot} has no run now and none in {}; name a run, or see `firsthand runs`",
+            runs.display()
+        )
+    })?)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,7 +1,6 @@
-//! Hypotheses about motion that readings contradict: readings are late, or the robot does not roll
-//! as far as its wheels count.
+//! Hypotheses about readings that contradict the wheels' motion.
 //!
-//! Each hypothesis gives the robot other poses. A monitor predicts readings from these poses, and
+//! Each hypothesis gives the robot other poses, or ranges other lengths. A monitor predicts readings, and
 //! adds up how much better each hypothesis predicts than the first, that all is healthy. The sums
 //! fade, and stay at 0 or above, as in Page's test (E. S. Page, "Continuous inspection schemes",
 //! Biometrika 41, 1954).
@@ -31,13 +30,14 @@ impl Hypothesis {
 
     /// Returns the poses at two times, the later one last.
     pub(super) fn robots(self, poses: &Poses, [from_s, to_s]: [f64; 2]) -> [Pose2; 2] {
+        let ago = |by_s: f64| [poses.at(from_s - by_s), poses.at(to_s - by_s)];
         match self {
-            Self::Late(by_s) => [poses.at(from_s - by_s), poses.at(to_s - by_s)],
+            Self::Late(by_s) => ago(by_s),
             Self::Rolls(share) => {
-                let counted = [poses.at(from_s), poses.at(to_s)];
+                let counted = ago(0.0);
                 [counted[0], rolled(counted[0], counted, share)]
             }
-            _ => [poses.at(from_s), poses.at(to_s)],
+            Self::Scaled(_) | Self::Longer(_) => ago(0.0),
         }
     }
 

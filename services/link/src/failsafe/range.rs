@@ -383,6 +383,7 @@ mod tests {
                 |sensor: u8, cm: u16| reading(sensor, (cm != 255).then_some(f64::from(cm) / 100.0));
             let beside = of((sensor + 1) % 3, 20 + 9 * (tick % 2) as u16);
             monitor.observe(&Observation::Readings(&[beside, of(sensor, range_cm(tick))]), now);
+            // Together, the readings fit no motion.
             monitor.rows.iter().any(|row| row.condition(true, now) == Condition::Holds)
         })
     }

@@ -314,9 +314,9 @@ mod tests {
     }
 
     #[test]
-    fn sonars_that_become_late_are_doubted_within_4_s() {
-        assert_eq!(taken(0..3, 0, 70..98, 98).judged(false), None);
-        names(&taken(0..3, 10, 70..98, 98).judged(false).unwrap(), 10);
+    fn sonars_that_become_late_are_doubted_within_2_s() {
+        assert_eq!(taken(0..3, 0, 70..84, 84).judged(false), None);
+        names(&taken(0..3, 10, 70..84, 84).judged(false).unwrap(), 10);
     }
 
     #[test]

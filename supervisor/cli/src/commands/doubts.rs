@@ -17,7 +17,7 @@ use serde::Serialize;
 /// 1 the robot stands. In lockstep, a simulated robot is not doubted.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Recording, or the directory of its run, instead of the newest run.
+    /// Recording, or the directory of its run, instead of the robot's current or newest run.
     #[arg(value_name = "RUN|RUN.mcap")]
     run: Option<PathBuf>,
     /// Name of the robot.
@@ -61,14 +61,8 @@ impl Doubt {
 }
 
 pub fn main(arguments: &Arguments) -> Result {
-    let newest = || Some(runs::newest(&arguments.runs, &arguments.robot)?.directory);
-    let run = arguments.run.clone().or_else(newest).ok_or_else(|| {
-        let Arguments { robot, runs, .. } = arguments;
-        format!(
-            "robot {robot} has no run in {}; name a run, or see `firsthand runs`",
-            runs.display()
-        )
-    })?;
+    let current = || runs::current_or_newest(&arguments.runs, &arguments.robot);
+    let run = arguments.run.clone().map_or_else(current, Ok)?;
     let mut doubts: Vec<Doubt> = DoubtsSample::default()
         .each()
         .into_iter()

@@ -41,14 +41,8 @@ pub fn main(arguments: &Arguments) -> Result {
     if arguments.follow {
         return follow(arguments, &mut stream);
     }
-    let robot = &arguments.robot;
-    let current = || Robot::find(robot.clone()).run;
-    let newest = || Some(runs::newest(&arguments.runs, robot)?.directory);
-    let found = arguments.run.clone().or_else(current).or_else(newest);
-    let directory = found.ok_or_else(|| {
-        let runs = arguments.runs.display();
-        format!("robot {robot} has no run now and none in {runs}; name its directory with --run, or see `firsthand runs`")
-    })?;
+    let current = || runs::current_or_newest(&arguments.runs, &arguments.robot);
+    let directory = arguments.run.clone().map_or_else(current, Ok)?;
     let mut logs = opened(arguments, &directory)?;
     Ok(print_round(&mut logs, &mut stream)?)
 }
