@@ -9,22 +9,14 @@
 //! up, so they need neither a correction nor a stored interpolation.
 
 use super::{
-    couplings::{EAST, SOUTH, SOUTH_EAST, SOUTH_WEST},
-    grid::{EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, Weights, around, correct, zero_values},
+    grid::{
+        E, EE, EO, Grid, MARGIN, N, NE, NW, OE, OO, Place, Planes, S, SE, SW, Scratch, Step, W,
+        Weights, around, correct, zero_values,
+    },
     kernels::{add_active, gather, relax, subtract, sum_weighted},
 };
 use crate::real::Real;
 
-/// Columns and rows from a cell to a neighbour.
-type Step = (isize, isize);
-const W: Step = (-1, 0);
-const E: Step = (1, 0);
-const N: Step = (0, -1);
-const S: Step = (0, 1);
-const NW: Step = (-1, -1);
-const NE: Step = (1, -1);
-const SW: Step = (-1, 1);
-const SE: Step = (1, 1);
 const ALL: [Step; 8] = [W, E, N, S, NW, NE, SW, SE];
 
 #[derive(Debug, Default)]
@@ -36,7 +28,8 @@ pub(super) struct Coarse<R> {
     pub f: Planes<R>,
     /// 1 / diagonal; 0 if the cell is inactive.
     pub inverse: Planes<R>,
-    /// Couplings (minus the matrix entries) by direction, then by plane.
+    /// Couplings (minus the matrix entries) to the east, south, south-east and south-west, by plane;
+    /// the neighbours store the others.
     pub coupling: [Planes<R>; 4],
     pub weights: Weights<R>,
     scratch: Scratch<R>,
@@ -167,23 +160,21 @@ impl<R: Real> Coarse<R> {
 
     #[inline(always)]
     fn term(&self, plane: usize, o: usize, n: usize, step: Step) -> (&[R], &[R]) {
-        let (there, at) = neighbour(&self.grid, plane, o, step);
-        let here = step.1 > 0 || step == E;
-        let (owner, from) = if here { (plane, o) } else { (there, at) };
-        let direction = match step {
-            E | W => EAST,
-            S | N => SOUTH,
-            SE | NW => SOUTH_EAST,
-            _ => SOUTH_WEST,
-        };
-        (&self.coupling[direction][owner][from..][..n], &self.u[there][at..][..n])
+        let (there, at) = self.grid.neighbour((plane, o), step);
+        (self.couplings((plane, o), step, n), &self.u[there][at..][..n])
     }
-}
 
-#[inline(always)]
-fn neighbour(grid: &Grid, plane: usize, at: usize, (dx, dy): Step) -> (usize, usize) {
-    let (x, y) = ((plane & 1) as isize + dx, (plane >> 1) as isize + dy);
-    let there = (x.rem_euclid(2) + 2 * y.rem_euclid(2)) as usize;
-    let offset = y.div_euclid(2) * grid.stride as isize + x.div_euclid(2);
-    (there, at.wrapping_add_signed(offset))
+    /// Returns the couplings of `n` cells with their neighbours at `step`.
+    #[inline(always)]
+    pub(super) fn couplings(&self, from: Place, step: Step, n: usize) -> &[R] {
+        let is_stored_here = step.1 > 0 || step == E;
+        let (plane, at) = if is_stored_here { from } else { self.grid.neighbour(from, step) };
+        let direction = match step {
+            E | W => 0,
+            S | N => 1,
+            SE | NW => 2,
+            _ => 3,
+        };
+        &self.coupling[direction][plane][at..][..n]
+    }
 }

@@ -2,7 +2,7 @@
 
 use super::{
     coarse::Coarse,
-    couplings::{EAST, SOUTH, SOUTH_EAST, SOUTH_WEST},
+    grid::{E, S, SE, SW},
 };
 use crate::real::Real;
 
@@ -28,12 +28,11 @@ impl Coarsest {
             // Inactive cells keep the identity and a right-hand side of zero.
             matrix[i * n + i] = if inverse > 0.0 { 1.0 / inverse } else { 1.0 };
             let (col, row) = (i % grid.width, i / grid.width);
-            let steps = [(EAST, 1, 0), (SOUTH, 0, 1), (SOUTH_EAST, 1, 1), (SOUTH_WEST, -1, 1)];
-            for (direction, dx, dy) in steps {
-                let (c, r) = (col as isize + dx, row + dy);
+            for step in [E, S, SE, SW] {
+                let (c, r) = (col as isize + step.0, row + step.1 as usize);
                 if c >= 0 && (c as usize) < grid.width && r < grid.height {
                     let j = r * grid.width + c as usize;
-                    let coupling = level.coupling[direction][plane][at].wide();
+                    let coupling = level.couplings((plane, at), step, 1)[0].wide();
                     matrix[i * n + j] = -coupling;
                     matrix[j * n + i] = -coupling;
                 }

@@ -7,17 +7,9 @@
 use super::{
     coarse::Coarse,
     finest::Finest,
-    grid::{Grid, Planes, Weights},
+    grid::{Grid, Place, Planes, Step, Weights},
 };
 use crate::real::Real;
-
-/// Directions in which a cell stores its couplings; the neighbours store the others.
-pub(super) const EAST: usize = 0;
-pub(super) const SOUTH: usize = 1;
-pub(super) const SOUTH_EAST: usize = 2;
-pub(super) const SOUTH_WEST: usize = 3;
-
-pub(super) type Place = (usize, usize);
 
 pub(super) trait Couplings<R: Real>: Copy {
     fn times(self, x: usize, value: R) -> R;
@@ -68,7 +60,7 @@ impl<R: Real> Couplings<R> for NoCouplings {
 
 /// Level whose equations make those of the next.
 ///
-/// Couplings are those of `n` cells from `owner` on, in the direction of storage.
+/// Couplings are those of `n` cells from a place on with their neighbours at `step`.
 pub(super) trait Level<R: Real> {
     fn grid(&self) -> Grid;
     /// Returns 1 / diagonal; 0 if the cell is inactive.
@@ -76,17 +68,11 @@ pub(super) trait Level<R: Real> {
     fn weights(&self) -> &Weights<R>;
     fn weights_mut(&mut self) -> &mut Weights<R>;
 
-    fn along(
-        &self,
-        direction: usize,
-        owner: Place,
-        neighbour: Place,
-        n: usize,
-    ) -> impl Couplings<R>;
+    fn along(&self, from: Place, step: Step, n: usize) -> impl Couplings<R>;
     /// Returns the couplings between odd-odd cells and others, for products that vanish in inactive
     /// odd-odd cells.
-    fn across(&self, direction: usize, owner: Place, n: usize) -> impl Couplings<R>;
-    fn diagonal(&self, direction: usize, owner: Place, n: usize) -> impl Couplings<R>;
+    fn across(&self, from: Place, step: Step, n: usize) -> impl Couplings<R>;
+    fn diagonal(&self, from: Place, step: Step, n: usize) -> impl Couplings<R>;
 }
 
 macro_rules! fields {
@@ -113,17 +99,18 @@ impl<R: Real> Level<R> for Finest<R> {
     fields!();
 
     #[inline(always)]
-    fn along(&self, _: usize, _: Place, (plane, at): Place, n: usize) -> impl Couplings<R> {
+    fn along(&self, from: Place, step: Step, n: usize) -> impl Couplings<R> {
+        let (plane, at) = self.grid.neighbour(from, step);
         IfActive(&self.inverse[plane][at..][..n])
     }
 
     #[inline(always)]
-    fn across(&self, _: usize, _: Place, _: usize) -> impl Couplings<R> {
+    fn across(&self, _: Place, _: Step, _: usize) -> impl Couplings<R> {
         AllOne
     }
 
     #[inline(always)]
-    fn diagonal(&self, _: usize, _: Place, _: usize) -> impl Couplings<R> {
+    fn diagonal(&self, _: Place, _: Step, _: usize) -> impl Couplings<R> {
         NoCouplings
     }
 }
@@ -132,17 +119,17 @@ impl<R: Real> Level<R> for Coarse<R> {
     fields!();
 
     #[inline(always)]
-    fn along(&self, direction: usize, owner: Place, _: Place, n: usize) -> impl Couplings<R> {
-        self.across(direction, owner, n)
+    fn along(&self, from: Place, step: Step, n: usize) -> impl Couplings<R> {
+        self.couplings(from, step, n)
     }
 
     #[inline(always)]
-    fn across(&self, direction: usize, (plane, at): Place, n: usize) -> impl Couplings<R> {
-        &self.coupling[direction][plane][at..][..n]
+    fn across(&self, from: Place, step: Step, n: usize) -> impl Couplings<R> {
+        self.couplings(from, step, n)
     }
 
     #[inline(always)]
-    fn diagonal(&self, direction: usize, owner: Place, n: usize) -> impl Couplings<R> {
-        self.across(direction, owner, n)
+    fn diagonal(&self, from: Place, step: Step, n: usize) -> impl Couplings<R> {
+        self.couplings(from, step, n)
     }
 }

@@ -9,8 +9,8 @@ use std::ops::Range;
 
 use super::{
     coarse::Coarse,
-    couplings::{Couplings as _, EAST, Level, SOUTH, SOUTH_EAST, SOUTH_WEST},
-    grid::{EE, EO, Grid, MARGIN, OE, OO, cut, first, split_row},
+    couplings::{Couplings as _, Level},
+    grid::{E, EE, EO, Grid, MARGIN, N, NE, NW, OE, OO, S, SE, SW, Step, W, cut, first, split_row},
 };
 use crate::real::Real;
 
@@ -23,7 +23,8 @@ pub(super) struct Products<R> {
     corner: [Rows<R, 4>; 2],
     /// By coarse cell: west, east, north-west, north-east, south-west, south-east.
     odd_even: Rows<R, 6>,
-    /// Row above, this row; by coarse cell: north, south, then as above.
+    /// Row above, this row; by coarse cell: north, south, north-west, south-west, north-east,
+    /// south-east.
     even_odd: [Rows<R, 6>; 2],
     /// Even-even products: diagonal, then the four stored directions.
     even_even: Rows<R, 5>,
@@ -64,7 +65,7 @@ impl<R: Real> Products<R> {
         let [e0, e1, e2, e3, e4] = places(&self.even_even, m, n);
         let [q_w, q_e, .., q_sw, q_se] = places(&self.odd_even, m, n);
         let [_, west_q_e, .., west_q_sw, west_q_se] = places(&self.odd_even, m - 1, n);
-        let [v_n, v_s, _, v_ne, v_sw, v_se] = places(&self.even_odd[1], m, n);
+        let [v_n, v_s, _, v_sw, v_ne, v_se] = places(&self.even_odd[1], m, n);
         let [_, above_v_s, .., above_v_se] = places(&self.even_odd[0], m, n);
         let [diagonal, right, down, down_right, down_left] = &mut self.out;
 
@@ -117,12 +118,10 @@ pub(super) fn corner_weights<R: Real>(
     cut!(0, n, nw, ne, sw, se);
     first!(n, w, e, w_below, e_below, no, so, no_east, so_east);
     let inverse = &fine.inverse()[OO][o..][..n];
-    let (up, down) = (fine.across(SOUTH, (OE, o), n), fine.across(SOUTH, (OO, o), n));
-    let (left, right) = (fine.across(EAST, (EO, o), n), fine.across(EAST, (OO, o), n));
-    let c_nw = fine.diagonal(SOUTH_EAST, (EE, o), n);
-    let c_ne = fine.diagonal(SOUTH_WEST, (EE, o + 1), n);
-    let c_sw = fine.diagonal(SOUTH_WEST, (OO, o), n);
-    let c_se = fine.diagonal(SOUTH_EAST, (OO, o), n);
+    let across = |step| fine.across((OO, o), step, n);
+    let (up, down, left, right) = (across(N), across(S), across(W), across(E));
+    let diagonal = |step| fine.diagonal((OO, o), step, n);
+    let (c_nw, c_ne, c_sw, c_se) = (diagonal(NW), diagonal(NE), diagonal(SW), diagonal(SE));
     for x in 0..n {
         nw[x] = inverse[x] * (c_nw.at(x) + up.times(x, w[x]) + left.times(x, no[x]));
         ne[x] = inverse[x] * (c_ne.at(x) + up.times(x, e[x]) + right.times(x, no_east[x]));
@@ -131,6 +130,72 @@ pub(super) fn corner_weights<R: Real>(
         sw[x] = inverse[x] * (c_sw.at(x) + down.times(x, w_below[x]) + left.times(x, so[x]));
         se[x] = inverse[x] * (c_se.at(x) + down.times(x, e_below[x]) + right.times(x, so_east[x]));
     }
+}
+
+/// Plane of the cells between coarse cells in a row or a column, and the steps from a cell to both
+/// coarse cells and to either side.
+#[derive(Clone, Copy)]
+struct Line {
+    plane: usize,
+    ends: [Step; 2],
+    sides: [Step; 2],
+}
+
+const IN_ROW: Line = Line { plane: OE, ends: [W, E], sides: [N, S] };
+const IN_COLUMN: Line = Line { plane: EO, ends: [N, S], sides: [W, E] };
+
+/// Multiplies the equations of `n` cells of a line from `o` by the interpolation.
+///
+/// `out` is by coarse cell: ends a and b, then corners pa, pb, qa and qb at the sides p and q.
+/// `weights` belong to the line, `sides` to the odd-odd cells beside it. `corners` belong to the
+/// diagonal neighbours: on the end, then on the coarse cell at the corner.
+#[inline(always)]
+fn multiply<R: Real>(
+    fine: &impl Level<R>,
+    Line { plane, ends: [a, b], sides: [p, q] }: Line,
+    (o, n): (usize, usize),
+    out: &mut Rows<R, 6>,
+    weights: [&[R]; 2],
+    sides: [[&[R]; 4]; 2],
+    corners: [[&[R]; 2]; 4],
+) {
+    let (here, zero) = ((plane, o), R::default());
+    let inverse = &fine.inverse()[plane][o..][..n];
+    let (to_a, to_b) = (fine.along(here, a, n), fine.along(here, b, n));
+    let (to_p, to_q) = (fine.across(here, p, n), fine.across(here, q, n));
+    let diagonal = |end, side| fine.diagonal(here, corner(end, side), n);
+    let (c_pa, c_pb, c_qa, c_qb) = (diagonal(a, p), diagonal(b, p), diagonal(a, q), diagonal(b, q));
+    let [w_a, w_b] = weights;
+    let [[p_pa, p_pb, p_a, p_b], [q_a, q_b, q_qa, q_qb]] = sides;
+    let [[pa_a, pa], [pb_b, pb], [qa_a, qa], [qb_b, qb]] = corners;
+    let [out_a, out_b, out_pa, out_pb, out_qa, out_qb] = out;
+    cut!(MARGIN, n, out_a, out_b, out_pa, out_pb, out_qa, out_qb);
+    for x in 0..n {
+        let d = inverse[x].inverse();
+        out_a[x] = d * w_a[x]
+            - to_a.at(x)
+            - to_p.times(x, p_a[x])
+            - to_q.times(x, q_a[x])
+            - c_pa.times(x, pa_a[x])
+            - c_qa.times(x, qa_a[x]);
+        out_b[x] = d * w_b[x]
+            - to_b.at(x)
+            - to_p.times(x, p_b[x])
+            - to_q.times(x, q_b[x])
+            - c_pb.times(x, pb_b[x])
+            - c_qb.times(x, qb_b[x]);
+    }
+    for x in 0..n {
+        out_pa[x] = zero - to_p.times(x, p_pa[x]) - c_pa.times(x, pa[x]);
+        out_pb[x] = zero - to_p.times(x, p_pb[x]) - c_pb.times(x, pb[x]);
+        out_qa[x] = zero - to_q.times(x, q_qa[x]) - c_qa.times(x, qa[x]);
+        out_qb[x] = zero - to_q.times(x, q_qb[x]) - c_qb.times(x, qb[x]);
+    }
+}
+
+#[inline(always)]
+const fn corner(end: Step, side: Step) -> Step {
+    (end.0 + side.0, end.1 + side.1)
 }
 
 #[inline(always)]
@@ -154,10 +219,6 @@ pub(super) fn coarsen<R: Real>(
         products.corner.swap(0, 1);
         products.even_odd.swap(0, 1);
         let o = fine.grid().start(y);
-        let along =
-            |direction, plane, start, there| fine.along(direction, (plane, start), (EE, there), n);
-        let across = |direction, plane, start| fine.across(direction, (plane, start), n);
-        let diagonal = |direction, plane, start| fine.diagonal(direction, (plane, start), n);
         let ([w, e], [no, so], [no_east, so_east]) = (we(o), ns(o), ns(o + 1));
         let ([w_west, e_west], [w_below_west, e_below_west]) = (we(o - 1), we(o + s - 1));
         let [w_below, e_below] = we(o + s);
@@ -170,74 +231,31 @@ pub(super) fn coarsen<R: Real>(
         let [a_nw, a_ne, a_sw, a_se] = places(above, m, n);
         let [h_nw, h_ne, h_sw, h_se] = places(here, m, n);
         let [l_nw, l_ne, l_sw, l_se] = places(here, m - 1, n);
-        {
-            let inverse = &fine.inverse()[OE][o..][..n];
-            let (left, right) = (along(EAST, EE, o, o), along(EAST, OE, o, o + 1));
-            let (up, down) = (across(SOUTH, OO, o - s), across(SOUTH, OE, o));
-            let (c_nw, c_ne) =
-                (diagonal(SOUTH_EAST, EO, o - s), diagonal(SOUTH_WEST, EO, o - s + 1));
-            let (c_sw, c_se) = (diagonal(SOUTH_WEST, OE, o), diagonal(SOUTH_EAST, OE, o));
-            let [q0, q1, q2, q3, q4, q5] = &mut products.odd_even;
-            cut!(m, n, q0, q1, q2, q3, q4, q5);
-            for x in 0..n {
-                let d = inverse[x].inverse();
-                q0[x] = d * w[x]
-                    - left.at(x)
-                    - up.times(x, a_sw[x])
-                    - down.times(x, h_nw[x])
-                    - c_nw.times(x, so_above[x])
-                    - c_sw.times(x, no[x]);
-                q1[x] = d * e[x]
-                    - right.at(x)
-                    - up.times(x, a_se[x])
-                    - down.times(x, h_ne[x])
-                    - c_ne.times(x, so_above_east[x])
-                    - c_se.times(x, no_east[x]);
-            }
-            for x in 0..n {
-                q2[x] = zero - up.times(x, a_nw[x]) - c_nw.times(x, no_above[x]);
-                q3[x] = zero - up.times(x, a_ne[x]) - c_ne.times(x, no_above_east[x]);
-                q4[x] = zero - down.times(x, h_sw[x]) - c_sw.times(x, so[x]);
-                q5[x] = zero - down.times(x, h_se[x]) - c_se.times(x, so_east[x]);
-            }
-        }
-        {
-            let inverse = &fine.inverse()[EO][o..][..n];
-            let (up, down) = (along(SOUTH, EE, o, o), along(SOUTH, EO, o, o + s));
-            let (left, right) = (across(EAST, OO, o - 1), across(EAST, EO, o));
-            let (c_nw, c_ne) = (diagonal(SOUTH_EAST, OE, o - 1), diagonal(SOUTH_WEST, OE, o));
-            let (c_sw, c_se) = (diagonal(SOUTH_WEST, EO, o), diagonal(SOUTH_EAST, EO, o));
-            let [v0, v1, v2, v3, v4, v5] = &mut products.even_odd[1];
-            cut!(m, n, v0, v1, v2, v3, v4, v5);
-            for x in 0..n {
-                let d = inverse[x].inverse();
-                v0[x] = d * no[x]
-                    - up.at(x)
-                    - left.times(x, l_ne[x])
-                    - right.times(x, h_nw[x])
-                    - c_nw.times(x, e_west[x])
-                    - c_ne.times(x, w[x]);
-                v1[x] = d * so[x]
-                    - down.at(x)
-                    - left.times(x, l_se[x])
-                    - right.times(x, h_sw[x])
-                    - c_sw.times(x, e_below_west[x])
-                    - c_se.times(x, w_below[x]);
-            }
-            for x in 0..n {
-                v2[x] = zero - left.times(x, l_nw[x]) - c_nw.times(x, w_west[x]);
-                v3[x] = zero - right.times(x, h_ne[x]) - c_ne.times(x, e[x]);
-                v4[x] = zero - left.times(x, l_sw[x]) - c_sw.times(x, w_below_west[x]);
-                v5[x] = zero - right.times(x, h_se[x]) - c_se.times(x, e_below[x]);
-            }
-        }
+        multiply(
+            fine,
+            IN_ROW,
+            (o, n),
+            &mut products.odd_even,
+            [w, e],
+            [[a_nw, a_ne, a_sw, a_se], [h_nw, h_ne, h_sw, h_se]],
+            [[so_above, no_above], [so_above_east, no_above_east], [no, so], [no_east, so_east]],
+        );
+        multiply(
+            fine,
+            IN_COLUMN,
+            (o, n),
+            &mut products.even_odd[1],
+            [no, so],
+            [[l_nw, l_sw, l_ne, l_se], [h_nw, h_sw, h_ne, h_se]],
+            [[e_west, w_west], [e_below_west, w_below_west], [w, e], [w_below, e_below]],
+        );
         {
             let inverse = &fine.inverse()[EE][o..][..n];
-            let (left, right) = (along(EAST, OE, o - 1, o), along(EAST, EE, o, o));
-            let (up, down) = (along(SOUTH, EO, o - s, o), along(SOUTH, EE, o, o));
-            let (c_nw, c_ne) =
-                (diagonal(SOUTH_EAST, OO, o - s - 1), diagonal(SOUTH_WEST, OO, o - s));
-            let (c_sw, c_se) = (diagonal(SOUTH_WEST, EE, o), diagonal(SOUTH_EAST, EE, o));
+            // On the finest level, the cell at the end of the step decides: the coarse one.
+            let (left, right) = (fine.along((OE, o - 1), E, n), fine.along((OE, o), W, n));
+            let (up, down) = (fine.along((EO, o - s), S, n), fine.along((EO, o), N, n));
+            let diagonal = |step| fine.diagonal((EE, o), step, n);
+            let (c_nw, c_ne, c_sw, c_se) = (diagonal(NW), diagonal(NE), diagonal(SW), diagonal(SE));
             let al_se = &above[3][m - 1..][..n];
             let [p0, p1, p2, p3, p4] = &mut products.even_even;
             cut!(m, n, p0, p1, p2, p3, p4);
@@ -277,41 +295,38 @@ pub(super) fn coarsen<R: Real>(
 /// then fail to converge.
 #[inline(always)]
 pub(super) fn interpolate<R: Real>(fine: &mut impl Level<R>, rows: Range<usize>) {
-    let Grid { columns: n, stride: s, .. } = fine.grid();
-    let least = R::of(1e-4);
-    let share = |d: R, a: R, b: R| {
-        let rest = d - a - b;
-        if rest > least * d { R::ONE / rest } else { R::default() }
-    };
+    let n = fine.grid().columns;
     let mut weights = std::mem::take(fine.weights_mut());
     for y in rows {
         let o = fine.grid().start(y);
-        let along = |direction, owner, there| fine.along(direction, owner, there, n);
-        let diagonal = |direction, plane, start| fine.diagonal(direction, (plane, start), n);
         let [to_west, to_east, to_north, to_south] = &mut weights;
-        cut!(o, n, to_west, to_east, to_north, to_south);
-        let own = &fine.inverse()[OE][o..][..n];
-        let (w, e) = (along(EAST, (EE, o), (EE, o)), along(EAST, (OE, o), (EE, o + 1)));
-        let (nw, ne) = (diagonal(SOUTH_EAST, EO, o - s), diagonal(SOUTH_WEST, EO, o + 1 - s));
-        let (sw, se) = (diagonal(SOUTH_WEST, OE, o), diagonal(SOUTH_EAST, OE, o));
-        let (no, so) = (along(SOUTH, (OO, o - s), (OO, o - s)), along(SOUTH, (OE, o), (OO, o)));
-        for x in 0..n {
-            let share = share(own[x].inverse(), no.at(x), so.at(x));
-            let (w, e) = (w.at(x), e.at(x));
-            to_west[x] = w.is_active() * (w + nw.at(x) + sw.at(x)) * share;
-            to_east[x] = e.is_active() * (e + ne.at(x) + se.at(x)) * share;
-        }
-        let own = &fine.inverse()[EO][o..][..n];
-        let (no, so) = (along(SOUTH, (EE, o), (EE, o)), along(SOUTH, (EO, o), (EE, o + s)));
-        let (nw, ne) = (diagonal(SOUTH_EAST, OE, o - 1), diagonal(SOUTH_WEST, OE, o));
-        let (sw, se) = (diagonal(SOUTH_WEST, EO, o), diagonal(SOUTH_EAST, EO, o));
-        let (w, e) = (along(EAST, (OO, o - 1), (OO, o - 1)), along(EAST, (EO, o), (OO, o)));
-        for x in 0..n {
-            let share = share(own[x].inverse(), w.at(x), e.at(x));
-            let (no, so) = (no.at(x), so.at(x));
-            to_north[x] = no.is_active() * (no + nw.at(x) + ne.at(x)) * share;
-            to_south[x] = so.is_active() * (so + sw.at(x) + se.at(x)) * share;
-        }
+        weigh(fine, IN_ROW, (o, n), [to_west, to_east]);
+        weigh(fine, IN_COLUMN, (o, n), [to_north, to_south]);
     }
     *fine.weights_mut() = weights;
+}
+
+/// Sets the weights of `n` cells of a line from `o` on the coarse cells at its ends.
+#[inline(always)]
+fn weigh<R: Real>(
+    fine: &impl Level<R>,
+    Line { plane, ends: [a, b], sides: [p, q] }: Line,
+    (o, n): (usize, usize),
+    [to_a, to_b]: [&mut Vec<R>; 2],
+) {
+    let (here, least) = ((plane, o), R::of(1e-4));
+    let along = |step| fine.along(here, step, n);
+    let diagonal = |end, side| fine.diagonal(here, corner(end, side), n);
+    let own = &fine.inverse()[plane][o..][..n];
+    let (c_a, c_b, c_p, c_q) = (along(a), along(b), along(p), along(q));
+    let (c_pa, c_pb, c_qa, c_qb) = (diagonal(a, p), diagonal(b, p), diagonal(a, q), diagonal(b, q));
+    cut!(o, n, to_a, to_b);
+    for x in 0..n {
+        let d = own[x].inverse();
+        let rest = d - c_p.at(x) - c_q.at(x);
+        let share = if rest > least * d { R::ONE / rest } else { R::default() };
+        let (at_a, at_b) = (c_a.at(x), c_b.at(x));
+        to_a[x] = at_a.is_active() * (at_a + c_pa.at(x) + c_qa.at(x)) * share;
+        to_b[x] = at_b.is_active() * (at_b + c_pb.at(x) + c_qb.at(x)) * share;
+    }
 }

@@ -12,6 +12,20 @@ pub(super) const OE: usize = 1;
 pub(super) const EO: usize = 2;
 pub(super) const OO: usize = 3;
 
+/// Plane of a cell, and its place there.
+pub(super) type Place = (usize, usize);
+
+/// Columns and rows from a cell to a neighbour.
+pub(super) type Step = (isize, isize);
+pub(super) const W: Step = (-1, 0);
+pub(super) const E: Step = (1, 0);
+pub(super) const N: Step = (0, -1);
+pub(super) const S: Step = (0, 1);
+pub(super) const NW: Step = (-1, -1);
+pub(super) const NE: Step = (1, -1);
+pub(super) const SW: Step = (-1, 1);
+pub(super) const SE: Step = (1, 1);
+
 /// Weights of the coarse cells west and east of odd-even cells, north and south of even-odd ones.
 pub(super) type Weights<R> = [Vec<R>; 4];
 
@@ -73,8 +87,16 @@ impl Grid {
     }
 
     #[inline(always)]
-    pub(super) fn locate(&self, col: usize, row: usize) -> (usize, usize) {
+    pub(super) fn locate(&self, col: usize, row: usize) -> Place {
         ((col & 1) + 2 * (row & 1), self.start(row / 2) + col / 2)
+    }
+
+    #[inline(always)]
+    pub(super) fn neighbour(&self, (plane, at): Place, (dx, dy): Step) -> Place {
+        let (x, y) = ((plane & 1) as isize + dx, (plane >> 1) as isize + dy);
+        let there = (x.rem_euclid(2) + 2 * y.rem_euclid(2)) as usize;
+        let offset = y.div_euclid(2) * self.stride as isize + x.div_euclid(2);
+        (there, at.wrapping_add_signed(offset))
     }
 
     #[inline(always)]
