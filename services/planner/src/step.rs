@@ -510,10 +510,10 @@ impl Planner {
 }
 
 fn screening(mission: &Mission) -> Screening {
-    mission.screening_length_m().map_or(Screening::None, |length| Screening::Uniform {
-        length,
+    Screening {
+        length: mission.screening_length_m().unwrap_or(f64::INFINITY),
         cell: mission.grid_frame().resolution_m,
-    })
+    }
 }
 
 #[cfg(test)]

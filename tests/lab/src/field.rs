@@ -65,7 +65,7 @@ pub fn main(arguments: &Arguments) -> Result {
 
 fn domain(arguments: &Arguments, map: &Map) -> Result<Domain> {
     let target = arguments.target_cell;
-    let screening = arguments.screening_cells.map_or(Screening::None, Screening::cells);
+    let screening = Screening::cells(arguments.screening_cells.unwrap_or(f64::INFINITY));
     let domain = Domain::new(map.cols, map.rows, map.blocked.clone(), target)
         .and_then(|domain| domain.with_screening(&screening));
     domain.map_err(|cause| {

@@ -54,9 +54,7 @@ impl Domain {
     /// # Errors
     /// [`SolveError::ScreeningLength`] if the length is NaN or below [`MIN_SCREENING_CELLS`].
     pub fn with_screening(mut self, screening: &Screening) -> Result<Self, SolveError> {
-        if let Screening::Uniform { length, cell } = screening {
-            check_length(length / cell)?;
-        }
+        check_length(screening.length / screening.cell)?;
         self.screening = screening.coefficient();
         assert!(self.screening >= 0.0 && self.screening.is_finite());
         Ok(self)

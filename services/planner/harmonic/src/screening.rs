@@ -6,32 +6,23 @@
 pub const MIN_SCREENING_CELLS: f64 = 5e-4;
 
 /// Screening of a map: k = (h / (2 L))^2 for cells of side h.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub enum Screening {
-    /// No screening: Laplace's equation, k = 0.
-    #[default]
-    None,
-    /// One screening length for all cells.
-    Uniform {
-        /// Screening length L, in the unit of `cell`.
-        length: f64,
-        /// Side h of a cell; 1 if `length` is in cells.
-        cell: f64,
-    },
+#[derive(Clone, Debug, PartialEq)]
+pub struct Screening {
+    /// Screening length L, in the unit of `cell`; infinity gives Laplace's equation, k = 0.
+    pub length: f64,
+    /// Side h of a cell; 1 if `length` is in cells.
+    pub cell: f64,
 }
 
 impl Screening {
     /// Creates a screening with `length` in cells; an infinite length means no screening.
     pub const fn cells(length: f64) -> Self {
-        Self::Uniform { length, cell: 1.0 }
+        Self { length, cell: 1.0 }
     }
 
     /// Returns the coefficient k.
     pub(crate) fn coefficient(&self) -> f64 {
-        match self {
-            Self::None => 0.0,
-            Self::Uniform { length, cell } => (cell / (2.0 * length)).powi(2),
-        }
+        (self.cell / (2.0 * self.length)).powi(2)
     }
 }
 
@@ -45,11 +36,10 @@ mod tests {
         for cells in [200, 1000] {
             let cell = 10.0 / f64::from(cells);
             let length = 0.5;
-            let k = Screening::Uniform { length, cell }.coefficient();
+            let k = Screening { length, cell }.coefficient();
             let decay = (1.0 + 2.0 * k).acosh() / cell;
             assert!((decay * length - 1.0).abs() < 1e-3, "{decay} a metre");
         }
-        assert_eq!(Screening::None.coefficient(), 0.0);
         assert_eq!(Screening::cells(f64::INFINITY).coefficient(), 0.0);
     }
 }

@@ -47,7 +47,7 @@ fn solve(
     })?;
     let [height, width] = [free.shape()[0], free.shape()[1]];
     let blocked = free.as_array().iter().map(|free| !free).collect();
-    let screening = screening.map_or(Screening::None, Screening::cells);
+    let screening = Screening::cells(screening.unwrap_or(f64::INFINITY));
     py.detach(|| {
         let domain =
             Domain::new(width, height, blocked, cell(target))?.with_screening(&screening)?;
