@@ -16,7 +16,7 @@ use common::{
     },
     shell::{Context, Process, Progress},
     stage::Runner,
-    start::StageError,
+    start::Result,
     target::TargetReader,
     topics::{CONTACT, DIRECTIVE, GRID, HEALTH, POSE, RANGES, SCAN, SCAN_FIX, TARGET, ZONES},
     wiring::{Persists, Topics},
@@ -49,11 +49,7 @@ struct OfTick<T>(Option<(u64, T)>);
 impl<T: Default> OfTick<T> {
     /// Takes the sample of `tick`, if any. Earlier ones are dropped; later ones wait for their
     /// pose.
-    fn take(
-        &mut self,
-        tick: u64,
-        mut next: impl FnMut() -> Result<Option<(u64, T)>, StageError>,
-    ) -> Result<T, StageError> {
+    fn take(&mut self, tick: u64, mut next: impl FnMut() -> Result<Option<(u64, T)>>) -> Result<T> {
         while self.0.as_ref().is_none_or(|(newest, _)| *newest < tick)
             && let Some(newer) = next()?
         {
@@ -82,7 +78,7 @@ impl Process for Shell {
     const PERSISTS: Persists = Persists::Journal;
     type Readers = Inputs;
 
-    fn open(context: &mut Context, inputs: Inputs) -> Result<Self, StageError> {
+    fn open(context: &mut Context, inputs: Inputs) -> Result<Self> {
         let runner = Runner::open(context, |mapper: &Mapper| mapper.frame().area())?;
         let version = runner.stage.state().version;
         if version > 1 {
@@ -92,7 +88,7 @@ impl Process for Shell {
         Ok(Self { inputs, runner, ranges, scans, contact, last_keyframe: None, zones: 0 })
     }
 
-    fn turn(&mut self) -> Result<Progress, StageError> {
+    fn turn(&mut self) -> Result<Progress> {
         let mut newest = None;
         while let Some(slice) = self.inputs.zones.next_slice()? {
             newest = Some((slice.header().number, ZoneCorner::zones(&slice)));
@@ -158,7 +154,7 @@ impl Process for Shell {
         Ok(self.runner.out.at)
     }
 
-    fn inject(&mut self, fault: FaultKind) -> Result<bool, StageError> {
+    fn inject(&mut self, fault: FaultKind) -> Result<bool> {
         self.step(Input::Fault(fault))?;
         Ok(true)
     }
@@ -167,7 +163,7 @@ impl Process for Shell {
         self.is_keyframe_due() || self.runner.out.is_journal_long()
     }
 
-    fn idle(&mut self) -> Result<(), StageError> {
+    fn idle(&mut self) -> Result {
         if self.is_keyframe_due() {
             self.publish_again()?;
         }
@@ -176,15 +172,15 @@ impl Process for Shell {
 }
 
 impl Shell {
-    fn step(&mut self, input: Input) -> Result<bool, StageError> {
+    fn step(&mut self, input: Input) -> Result<bool> {
         self.take(Entry::Step(input, self.runner.out.at))
     }
 
-    fn publish_again(&mut self) -> Result<(), StageError> {
+    fn publish_again(&mut self) -> Result {
         self.take(Entry::Again(self.runner.out.at)).map(drop)
     }
 
-    fn take(&mut self, entry: Entry) -> Result<bool, StageError> {
+    fn take(&mut self, entry: Entry) -> Result<bool> {
         let published = self.runner.take_entry(entry)?;
         if published.is_some_and(|part| part.is_keyframe()) {
             self.last_keyframe = Some(self.runner.out.at.time);

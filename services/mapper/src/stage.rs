@@ -7,7 +7,7 @@ use common::{
     outputs::Outputs,
     shell::{Context, Progress},
     stage::{ForeignState, Stage},
-    start::StageError,
+    start::Result,
     topics::{GRID, SCAN_FIX},
 };
 use serde::{Deserialize, Serialize};
@@ -31,7 +31,7 @@ impl Stage for Mapper {
         Self::new(mission)
     }
 
-    fn start(&self, context: &mut Context) -> Result<Self::Start, StageError> {
+    fn start(&self, context: &mut Context) -> Result<Self::Start> {
         context.saved_journal(self.saved_bytes(), self.entry_bytes())
     }
 
@@ -45,7 +45,7 @@ impl Stage for Mapper {
         restored
     }
 
-    fn take_entry(&mut self, entry: Entry, out: &mut Outputs) -> Result<Option<Part>, StageError> {
+    fn take_entry(&mut self, entry: Entry, out: &mut Outputs) -> Result<Option<Part>> {
         let change = match entry {
             Entry::Step(input, at) => {
                 out.at = at;

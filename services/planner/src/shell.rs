@@ -10,7 +10,7 @@ use common::{
     samples::{BaseResponseSample, CommandSample, FaultKind, GridHeader, PoseSample},
     shell::{Context, Process, Progress},
     stage::Runner,
-    start::StageError,
+    start::{Result, StageError},
     target::TargetReader,
     topics::{BASE_RESPONSE, COMMAND, FIELD, GRID, GUIDANCE, POSE, TARGET},
     wiring::Topics,
@@ -59,7 +59,7 @@ impl Process for Shell {
     const OUTPUTS: Topics = &[&GUIDANCE, &FIELD];
     type Readers = Inputs;
 
-    fn open(context: &mut Context, inputs: Inputs) -> Result<Self, StageError> {
+    fn open(context: &mut Context, inputs: Inputs) -> Result<Self> {
         let no_thread = |error| StageError::Other(format!("cannot start a thread: {error}"));
         let background = Worker::on_a_thread().map_err(no_thread)?;
         // In lockstep, a due result is awaited instead.
@@ -84,7 +84,7 @@ impl Process for Shell {
         })
     }
 
-    fn turn(&mut self) -> Result<Progress, StageError> {
+    fn turn(&mut self) -> Result<Progress> {
         let knew_target = self.has_target;
         if !knew_target {
             self.take_target(0)?;
@@ -108,7 +108,7 @@ impl Process for Shell {
         Ok(if self.has_target { self.runner.out.at } else { Progress::default() })
     }
 
-    fn inject(&mut self, fault: FaultKind) -> Result<bool, StageError> {
+    fn inject(&mut self, fault: FaultKind) -> Result<bool> {
         let robot = self.latest_pose.unwrap_or_default().pose().position;
         Ok(self.take(Taken::Fault(fault, robot))?.changed())
     }
@@ -118,7 +118,7 @@ impl Process for Shell {
         true
     }
 
-    fn idle(&mut self) -> Result<(), StageError> {
+    fn idle(&mut self) -> Result {
         let work = self.take(Taken::Idle)?;
         if work == Work::Solved && !self.lockstep {
             self.answer()?;
@@ -133,11 +133,11 @@ impl Process for Shell {
 }
 
 impl Shell {
-    fn take(&mut self, taken: Taken<'_>) -> Result<Work, StageError> {
+    fn take(&mut self, taken: Taken<'_>) -> Result<Work> {
         self.take_at(taken, self.runner.out.at)
     }
 
-    fn take_at(&mut self, taken: Taken<'_>, at: Progress) -> Result<Work, StageError> {
+    fn take_at(&mut self, taken: Taken<'_>, at: Progress) -> Result<Work> {
         let work = self.runner.take_entry(Entry { taken, at })?;
         let work = work.map_err(|error| StageError::Other(format!("no field: {error}")))?;
         self.field_changed |= work.changed();
@@ -151,7 +151,7 @@ impl Shell {
     /// Takes the solver's results and returns whether the field changed.
     ///
     /// In lockstep, a result is taken exactly one tick after its job began, for repeatable runs.
-    fn take_solved(&mut self) -> Result<bool, StageError> {
+    fn take_solved(&mut self) -> Result<bool> {
         let tick = self.runner.out.at.tick;
         let due = self.job.take_if(|(_, began)| self.lockstep && tick > *began);
         let mut swapped = false;
@@ -173,7 +173,7 @@ impl Shell {
         }
     }
 
-    fn take_target(&mut self, tick: u64) -> Result<(), StageError> {
+    fn take_target(&mut self, tick: u64) -> Result {
         if let Some(target) = self.inputs.target.next(tick)? {
             self.has_target = true;
             let work = self.take(Taken::Target(target))?;
@@ -183,7 +183,7 @@ impl Shell {
         Ok(())
     }
 
-    fn follow_grid(&mut self) -> Result<bool, StageError> {
+    fn follow_grid(&mut self) -> Result<bool> {
         let mut asked = false;
         while let Some(grid) = self.inputs.grid.next_slice()? {
             let GridHeader { stamp, part, .. } = *grid.header();
@@ -201,7 +201,7 @@ impl Shell {
     }
 
     /// The tick's pose is published before its grid.
-    fn answer(&mut self) -> Result<(), StageError> {
+    fn answer(&mut self) -> Result {
         self.latest_pose = self.inputs.pose.newest()?.or(self.latest_pose);
         // A keyframe for new readers may belong to a past tick.
         let tick = self.runner.out.at.tick;
@@ -221,7 +221,7 @@ impl Shell {
         Ok(())
     }
 
-    fn publish_field(&mut self) -> Result<(), StageError> {
+    fn publish_field(&mut self) -> Result {
         let Runner { stage, out } = &mut self.runner;
         let (now, has_new_reader) = (out.at, out.has_new_reader(&FIELD)?);
         if let Some((part, at)) = self.field.next(now, has_new_reader, &mut stage.policy) {

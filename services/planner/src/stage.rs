@@ -14,7 +14,7 @@ use common::{
     },
     shell::{Context, Progress},
     stage::{ForeignState, Stage},
-    start::StageError,
+    start::Result,
     topics::{FIELD, GUIDANCE},
 };
 use glam::DVec2;
@@ -88,7 +88,7 @@ impl Stage for PlannerStage {
         }
     }
 
-    fn start(&self, _: &mut Context) -> Result<(), StageError> {
+    fn start(&self, _: &mut Context) -> Result {
         Ok(())
     }
 
@@ -100,7 +100,7 @@ impl Stage for PlannerStage {
         &mut self,
         Entry { taken, at }: Entry<'_>,
         out: &mut Outputs,
-    ) -> Result<Self::Outcome, StageError> {
+    ) -> Result<Self::Outcome> {
         let began = Instant::now();
         let planner = &mut self.planner;
         let outcome = match taken {
@@ -168,12 +168,7 @@ impl PlannerStage {
         Solved { number, field: Err(SolveError::Cancelled), took_ns: 0 }
     }
 
-    fn publish_field(
-        &mut self,
-        part: Part,
-        at: Progress,
-        out: &mut Outputs,
-    ) -> Result<(), StageError> {
+    fn publish_field(&mut self, part: Part, at: Progress, out: &mut Outputs) -> Result {
         if let Some(snapshot) = self.snapshot.take_if(|_| out.has_field()) {
             self.policy = Some(Policy::of(&snapshot));
         }
