@@ -12,17 +12,13 @@ use common::{
     mission::{Body, Odometry},
 };
 use nalgebra::{SMatrix, SVector};
-use serde::{Deserialize, Serialize};
 
 /// x, y, theta, diameter ratio, track, distance, gyro bias; m, rad, shares, rad/s.
 pub(crate) const PARTS: usize = 7;
 pub(crate) const BIAS: usize = 6;
 
 pub(crate) type Error = SVector<f64, PARTS>;
-type Matrix = SMatrix<f64, PARTS, PARTS>;
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Covariance(pub(crate) Matrix);
+pub(crate) type Matrix = SMatrix<f64, PARTS, PARTS>;
 
 /// Deviation of a gyro's bias before it is learned at rest, rad/s: 0.1 degrees/s. Worse sources
 /// remove their bias themselves. With more, a robot that never rests takes unequal wheels for bias.
@@ -63,18 +59,11 @@ impl ErrorModel {
         }
     }
 
-    /// Returns the start, exact in pose because it defines the mission frame.
-    pub(crate) fn start(&self) -> Covariance {
+    /// Returns the start's covariance, exact in pose because it defines the mission frame.
+    pub(crate) fn start(&self) -> Matrix {
         let [ratio, track, distance] = self.systematic;
-        Covariance(Matrix::from_diagonal(&Error::from([
-            0.0,
-            0.0,
-            0.0,
-            ratio,
-            track,
-            distance,
-            BIAS_RAD_S * BIAS_RAD_S,
-        ])))
+        let bias = BIAS_RAD_S * BIAS_RAD_S;
+        Matrix::from_diagonal(&Error::from([0.0, 0.0, 0.0, ratio, track, distance, bias]))
     }
 
     /// The shares are of ratio, track and distance.
@@ -159,11 +148,9 @@ impl ErrorModel {
     }
 }
 
-impl Covariance {
-    /// Returns xx, xy, x theta, yy, y theta, theta theta; m^2, m rad, rad^2.
-    pub(crate) fn of_pose(&self) -> [f64; 6] {
-        upper(self.0.fixed_view::<3, 3>(0, 0).into_owned())
-    }
+/// Returns xx, xy, x theta, yy, y theta, theta theta; m^2, m rad, rad^2.
+pub(crate) fn of_pose(covariance: &Matrix) -> [f64; 6] {
+    upper(covariance.fixed_view::<3, 3>(0, 0).into_owned())
 }
 
 /// Returns the upper triangle of a covariance, row by row.
@@ -197,10 +184,10 @@ mod tests {
         let (mut pose, mut covariance) = (Pose2::default(), model.start());
         for moved in ticks {
             let Transition { carried, noise } = model.transition(pose, moved, 0.1);
-            covariance = Covariance(carried * covariance.0 * carried.transpose() + noise);
+            covariance = carried * covariance * carried.transpose() + noise;
             pose = pose.along_arc(moved.v, moved.omega);
         }
-        covariance.of_pose()
+        of_pose(&covariance)
     }
 
     fn close(got: f64, want: f64) {

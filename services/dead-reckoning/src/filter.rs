@@ -17,7 +17,7 @@ use nalgebra::{Const, DimMin, SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    covariance::{BIAS, Covariance, Error, ErrorModel, PARTS, Transition, upper},
+    covariance::{BIAS, Error, ErrorModel, Matrix, PARTS, Transition, upper},
     gyro::Gyro,
     tick::Tick,
 };
@@ -156,7 +156,7 @@ pub(crate) struct Filter {
     /// Errors of diameter ratio, track and distance.
     shares: [f64; 3],
     bias: f64,
-    pub covariance: Covariance,
+    pub covariance: Matrix,
     anchor: Anchor,
 }
 
@@ -200,7 +200,7 @@ impl Anchor {
 }
 
 impl Filter {
-    pub(crate) fn new(pose: Pose2, covariance: Covariance) -> Self {
+    pub(crate) fn new(pose: Pose2, covariance: Matrix) -> Self {
         Self { pose, covariance, ..Self::default() }
     }
 
@@ -216,9 +216,9 @@ impl Filter {
         if tick.gyro.is_some() {
             noise[(2, 2)] += motions.errors.counted(tick.moved());
         }
-        let before = self.covariance.0;
+        let before = self.covariance;
         self.pose = motions.along(self.pose, moved);
-        self.covariance = Covariance(carried * before * carried.transpose() + noise);
+        self.covariance = carried * before * carried.transpose() + noise;
         if let Some(gyro) = tick.gyro {
             // A gyro measures a difference of headings, so the earlier one joins the error.
             let mut both = SMatrix::<f64, JOINT, PARTS>::zeros();
@@ -235,7 +235,7 @@ impl Filter {
             let residual = SVector::from([gyro.turn - expected]);
             if let Some((error, joint)) = update(&joint, &seen, residual, variance, f64::INFINITY) {
                 self.correct(&error.fixed_rows::<PARTS>(0).into_owned());
-                self.covariance = Covariance(joint.fixed_view::<PARTS, PARTS>(0, 0).into_owned());
+                self.covariance = joint.fixed_view::<PARTS, PARTS>(0, 0).into_owned();
             }
         }
     }
@@ -260,17 +260,17 @@ impl Filter {
                 // More on the diagonal keeps the matrix positive.
                 covariance[(part, part)] = covariance[(part, part)].max(least);
             }
-            self.covariance = Covariance(covariance);
+            self.covariance = covariance;
         }
         taken.is_some()
     }
 
-    fn updated(&self, fix: &Fix, there: Pose2) -> Option<(Error, SMatrix<f64, PARTS, PARTS>)> {
+    fn updated(&self, fix: &Fix, there: Pose2) -> Option<(Error, Matrix)> {
         let lever = self.pose.position - there.position;
         let mut seen = SMatrix::<f64, 3, PARTS>::identity();
         (seen[(0, 2)], seen[(1, 2)]) = (lever.y, -lever.x);
         let [x, y] = (fix.position - there.position).to_array();
-        let (mut covariance, noise) = (self.covariance.0, fix.noise());
+        let (mut covariance, noise) = (self.covariance, fix.noise());
         match fix.heading {
             Some(heading) => {
                 let residual = SVector::from([x, y, wrapped(heading - there.heading)]);
@@ -305,7 +305,7 @@ impl Filter {
     /// Moves the estimate to `pose` with these variances, for a restarted matcher. Wheel and gyro
     /// errors stay.
     pub(crate) fn moved_to(mut self, pose: Pose2, position: f64, heading: f64) -> Self {
-        let covariance = &mut self.covariance.0;
+        let covariance = &mut self.covariance;
         for (part, variance) in [position, position, heading].into_iter().enumerate() {
             covariance.row_mut(part).fill(0.0);
             covariance.column_mut(part).fill(0.0);

@@ -19,7 +19,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    covariance::ErrorModel,
+    covariance::{self, ErrorModel},
     disagreement::{Cause, DOUBT, Disagreement},
     doubt::Doubt,
     filter::{Filter, Fix, History, Motions, Refused, wrapped},
@@ -454,7 +454,7 @@ impl DeadReckoning {
         let [x, y] = (estimate.pose.position - position).to_array();
         let turn = estimate.pose.heading - heading;
         let way = [x * x, x * y, x * turn, y * y, y * turn, turn * turn];
-        let mut covariance = estimate.covariance.of_pose();
+        let mut covariance = covariance::of_pose(&estimate.covariance);
         covariance.iter_mut().zip(way).for_each(|(entry, more)| *entry += more);
         let [mut place, mut heading_doubt] = self.state.doubt.variances(self.body.track_m);
         if self.state.disagreement.is_named() {
