@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use common::{
     clock::MissionTime,
     driver::{Heard, LaserScan, Motion, counts::WheelCounts},
-    mission::{Body, Mission, Sensor, SensorKind},
+    mission::{Body, Mission, Sensor},
     samples::{LONGEST_SWEEP_NS, RangeReading, RangeStatus},
 };
 use robot_time::RobotTime;
@@ -34,12 +34,11 @@ pub(crate) struct Sensors {
 impl Sensors {
     pub(crate) fn new(mission: &Mission) -> Self {
         let table = mission.sensor_table();
-        let rows = table.iter().enumerate();
-        let lasers = rows.filter(|(_, sensor)| sensor.kind == SensorKind::Scan);
+        let lasers = mission.lasers().into_iter();
         Self {
             body: mission.body(),
             newest: absent(&table),
-            lasers: lasers.map(|(row, sensor)| Laser::new(row, sensor.clone())).collect(),
+            lasers: lasers.map(|(row, sensor)| Laser::new(row, sensor)).collect(),
             table,
             ticks: 0,
             robot_time: RobotTime::default(),

@@ -1,7 +1,7 @@
 //! Link as a stage: records and publishes the step, telemetry and wire bytes.
 
 use common::{
-    mission::{Mission, SensorKind},
+    mission::Mission,
     outputs::Outputs,
     samples::{
         Direction, DoubtsSample, InfraredSample, PowerSample, RangesHeader, ScanHeader,
@@ -109,8 +109,7 @@ impl Stage for LinkStage {
     type Outcome = Vec<Effect>;
 
     fn new(mission: &Mission) -> Self {
-        let table = mission.sensor_table().into_iter().enumerate();
-        let lasers = table.filter(|(_, sensor)| sensor.kind == SensorKind::Scan);
+        let lasers = mission.lasers().into_iter();
         Self {
             link: Link::new(mission),
             lasers: lasers.map(|(row, laser)| (ScanHeader::of(row, &laser), laser.beams)).collect(),
