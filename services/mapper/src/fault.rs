@@ -15,11 +15,3 @@ pub(crate) fn covers(fault: FaultKind, at: DVec2, side: f64, robot: DVec2, targe
         _ => false,
     }
 }
-
-/// Returns the fault that outlasts a reset of the belief.
-pub(crate) fn after_reset(fault: FaultKind) -> FaultKind {
-    match fault {
-        FaultKind::CutOff => fault,
-        _ => FaultKind::Nothing,
-    }
-}

@@ -496,7 +496,10 @@ impl Mapper {
                 );
             }
         }
-        self.belief.fault = fault::after_reset(self.belief.fault);
+        // The wall around the target outlasts a reset.
+        if self.belief.fault != FaultKind::CutOff {
+            self.belief.fault = FaultKind::Nothing;
+        }
         self.belief.surroundings = None;
         self.falsify();
         self.belief.epoch = epoch;
