@@ -4,7 +4,8 @@
 //! map, may leave the way open. Right before the body, the nearest echo decides.
 
 use common::{kinematics::Pose2, samples::GridHeader};
-use glam::DVec2;
+
+use crate::undetected_surfaces::Beam;
 
 /// Newest readings per sonar that count, about a second, which limits the stop by a false echo.
 const NEWEST: usize = 8;
@@ -22,16 +23,16 @@ pub(crate) fn clear_ahead_m(belief: &GridHeader, pose: &Pose2, radius: f64, sona
     let (axis, within) = (pose.axis(), AHEAD_DEG.to_radians().cos());
     let newest = belief.clear_beams().iter().rev().take(NEWEST * sonars);
     newest
-        .filter(|beam| DVec2::from_angle(beam.bearing_rad.into()).dot(axis) >= within)
-        .map(|beam| {
-            let origin = DVec2::new(beam.x_m.into(), beam.y_m.into());
-            (origin - pose.position).dot(axis) + f64::from(beam.clear_m) - radius
-        })
+        .map(Beam::from)
+        .filter(|beam| beam.axis.dot(axis) >= within)
+        .map(|beam| (beam.origin - pose.position).dot(axis) + beam.clear - radius)
         .fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec2;
+
     use super::*;
     use crate::testing::{beam, belief};
 

@@ -56,11 +56,12 @@ pub(crate) struct UndetectedSurfaces {
     answers: [f64; 2],
 }
 
+/// A reading in the mission frame, metres.
 #[derive(Clone, Copy)]
-struct Beam {
-    origin: DVec2,
-    axis: DVec2,
-    clear: f64,
+pub(crate) struct Beam {
+    pub origin: DVec2,
+    pub axis: DVec2,
+    pub clear: f64,
     /// Whether an assumed surface may lie beyond the free length, with its echo before it.
     may_echo: bool,
 }
