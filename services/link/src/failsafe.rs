@@ -21,6 +21,7 @@ pub mod orders;
 pub mod presence;
 pub mod range;
 mod range_motion;
+mod repeats;
 mod response_fit;
 pub mod restart;
 mod scan_motion;

@@ -197,8 +197,9 @@ const PER_HOURS: f64 = 100.0;
 /// Evidence against healthy robots.
 #[derive(Default)]
 struct Doubts {
+    missions: usize,
     hours: f64,
-    /// Greatest evidence of each mission, by doubt.
+    /// Greatest evidence of each mission that had some, by doubt.
     greatest: BTreeMap<&'static str, Vec<f64>>,
     causes: BTreeMap<&'static str, u32>,
 }
@@ -210,6 +211,7 @@ impl Doubts {
         greatest: &BTreeMap<&'static str, f64>,
         causes: Vec<(Cause, &'static str)>,
     ) {
+        self.missions += usize::from(hours > 0.0);
         self.hours += hours;
         for (doubt, evidence) in greatest {
             self.greatest.entry(doubt).or_default().push(*evidence);
@@ -229,6 +231,7 @@ impl Doubts {
         rows.write_record(["section", "doubt", "hours", "95 %", "largest", "found", "expected"])?;
         let hours = format!("{:.1}", self.hours);
         for (doubt, mut all) in self.greatest {
+            all.resize(self.missions, 0.0);
             all.sort_by(f64::total_cmp);
             let (below, tail) = all.split_at(((1.0 - TAIL) * all.len() as f64) as usize);
             let least = below.last().copied().unwrap_or_default();

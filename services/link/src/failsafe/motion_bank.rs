@@ -57,7 +57,7 @@ impl Hypothesis {
         }
     }
 
-    fn words(self, whose: &str) -> String {
+    pub(super) fn words(self, whose: &str) -> String {
         let found = match self {
             Self::Late(by_s) => format!(
                 "are consistent only if they are {by_s} s later than stated; find what delays them, or send their age"

@@ -50,7 +50,7 @@ const FOLLOWS_RAD: f64 = 0.12;
 /// over that if 0.45 do not.
 const ODD: [f64; 2] = [-1.012, 0.575];
 /// Sums for doubt and for certainty.
-const ODD_SUMS: [f64; 2] = [5.0, 10.0];
+const ODD_SUMS: [f64; 2] = [5.0, 11.0];
 /// Time of changing readings that clears the cause.
 pub(crate) const CHANGES: Duration = Duration::from_secs(2);
 

@@ -5,9 +5,7 @@
 //! range is compared.
 //!
 //! At constant speed a lag shifts all hits alike. Only a turn, a change of speed, or its beginning
-//! shows it. When a lag begins, all readings jump back to those of some time ago. They are compared
-//! with prompt hits only after such a jump, because a wall beside the robot, or a person who walks
-//! ahead, also reads the same as before.
+//! shows it. [`super::repeats`] finds a lag that begins.
 //!
 //! A sure verdict holds until the operator resumes.
 
@@ -20,10 +18,13 @@ use common::{
 };
 use glam::DVec2;
 
-use super::motion_bank::{
-    Bank,
-    Hypothesis::{self, Late, Rolls},
-    Poses, Row, rolled,
+use super::{
+    motion_bank::{
+        Bank,
+        Hypothesis::{self, Late, Rolls},
+        Poses, Row, rolled,
+    },
+    repeats::Repeats,
 };
 
 /// Hypotheses with their limits: sums in metres for doubt and for certainty.
@@ -31,13 +32,13 @@ use super::motion_bank::{
 /// `firsthand-lab corpus` prints how often healthy missions reach certainty.
 const ALL: [Row; 12] = [
     (Hypothesis::HEALTHY, [1.0, 1.0]),
-    (Late(0.3), [0.9, 1.4]),
-    (Late(0.5), [1.5, 2.6]),
-    (Late(0.75), [1.5, 2.8]),
-    (Late(1.0), [1.5, 2.8]),
-    (Late(1.25), [1.5, 2.8]),
-    (Late(1.5), [1.6, 3.0]),
-    (Late(2.0), [1.6, 3.2]),
+    (Late(0.3), [0.9, 1.6]),
+    (Late(0.5), [1.5, 3.0]),
+    (Late(0.75), [1.5, 3.2]),
+    (Late(1.0), [1.5, 3.2]),
+    (Late(1.25), [1.5, 3.2]),
+    (Late(1.5), [1.6, 3.4]),
+    (Late(2.0), [1.6, 3.6]),
     (Rolls(0.5), [3.6, 5.5]),
     (Rolls(0.75), [1.7, 2.6]),
     (Rolls(1.33), [0.9, 1.4]),
@@ -56,11 +57,6 @@ const APART_S: [f64; 2] = [0.1, 0.5];
 const LEAST_AGE_S: f64 = 0.7;
 const MOST_AGE_S: f64 = 7.0;
 const MOST_HITS: usize = 1024;
-/// Least change of a reading beyond the robot's motion that is a jump, metres, time for which it
-/// counts, seconds, and motion by a turn, metres per radian.
-const JUMP_M: f64 = 0.1;
-const JUMP_S: f64 = 1.0;
-const JUMP_M_PER_RAD: f64 = 0.3;
 /// Metres: a hit beyond `NEW_M` is of a new surface, one delay must bring it within `NEAR_M`, and
 /// delays must differ by `TELLS_M`.
 const NEW_M: f64 = 0.2;
@@ -78,27 +74,10 @@ struct Hit {
     arc: [DVec2; 4],
 }
 
-/// Reading and robot of a sensor's newest hit, and time of its last jump.
-#[derive(Clone, Debug)]
-struct Newest {
-    range_m: f64,
-    robot: Pose2,
-    jumped_s: f64,
-}
-
-impl Newest {
-    fn has_jumped(&self, range_m: f64, robot: Pose2) -> bool {
-        let went_m = self.robot.position.distance(robot.position)
-            + JUMP_M_PER_RAD * (self.robot.heading - robot.heading).abs();
-        (range_m - self.range_m).abs() > JUMP_M + went_m
-    }
-}
-
 #[derive(Clone, Debug)]
 pub(super) struct RangeMotion {
     sensors: BTreeMap<u8, Sensor>,
     hits: VecDeque<(f64, Hit)>,
-    newest: BTreeMap<u8, Newest>,
     /// Robot now by the wheels, and under each hypothesis.
     robot: Pose2,
     robots: [Pose2; ALL.len()],
@@ -107,8 +86,8 @@ pub(super) struct RangeMotion {
     newest_s: f64,
     /// Time in motion, seconds.
     motion_s: f64,
-    /// Sums for a lag as long as the hits compared, and for one that has just begun.
-    better: [Bank<{ ALL.len() }>; 2],
+    better: Bank<{ ALL.len() }>,
+    repeats: Repeats,
 }
 
 impl RangeMotion {
@@ -123,13 +102,13 @@ impl RangeMotion {
         Self {
             sensors,
             hits: VecDeque::new(),
-            newest: BTreeMap::new(),
             robot: Pose2::default(),
             robots: [Pose2::default(); ALL.len()],
             latest: [Pose2::default(); ALL.len()],
             newest_s: 0.0,
             motion_s: 0.0,
-            better: [(); 2].map(|()| Bank::of(&ALL)),
+            better: Bank::of(&ALL),
+            repeats: Repeats::default(),
         }
     }
 
@@ -138,6 +117,15 @@ impl RangeMotion {
     }
 
     pub(super) fn take(&mut self, readings: &[RangeReading], poses: &Poses, at_s: f64) {
+        if self.judged(true).is_some() {
+            return;
+        }
+        let is_judged = |it: &&RangeReading| {
+            it.status() == RangeStatus::Measured && self.sensors.contains_key(&it.sensor)
+        };
+        for reading in readings.iter().filter(is_judged) {
+            self.repeats.take(reading.sensor, reading.range_m, at_s);
+        }
         let counted = [self.robot, poses.at(at_s)];
         self.robot = counted[1];
         for (robot, (hypothesis, _)) in self.robots.iter_mut().zip(ALL) {
@@ -155,17 +143,14 @@ impl RangeMotion {
         });
         // A clock may have been set back.
         let passed_s = (at_s - self.newest_s).abs().min(APART_S[1]);
-        let is_sure = self.better.iter().any(|bank| bank.likeliest(true).is_some());
-        if is_sure || passed_s < APART_S[0] || moved == [false; ALL.len()] {
+        if passed_s < APART_S[0] || moved == [false; ALL.len()] {
             return;
         }
         (self.latest, self.newest_s) = (robots, at_s);
         self.motion_s += passed_s;
         assert!((APART_S[0]..=APART_S[1]).contains(&passed_s));
         let now_s = self.motion_s;
-        for bank in &mut self.better {
-            (0..ALL.len()).for_each(|it| bank.fade(it, (-passed_s / FADE_S).exp()));
-        }
+        (0..ALL.len()).for_each(|it| self.better.fade(it, (-passed_s / FADE_S).exp()));
         let is_old = |(then_s, _): &(f64, Hit)| now_s - then_s > MOST_AGE_S;
         while self.hits.len() > MOST_HITS || self.hits.front().is_some_and(is_old) {
             self.hits.pop_front();
@@ -190,35 +175,20 @@ impl RangeMotion {
                     _ => under[delay].distance(other),
                 }
             };
-            let newest = self.newest.get(&reading.sensor);
-            let jumped_s = match newest {
-                Some(newest) if newest.has_jumped(range_m, robots[0]) => at_s,
-                _ => newest.map_or(f64::NEG_INFINITY, |newest| newest.jumped_s),
-            };
-            self.newest.insert(reading.sensor, Newest { range_m, robot: robots[0], jumped_s });
-            let lags = 1 + usize::from(at_s - jumped_s < JUMP_S);
-            let mut least_m = [[NEW_M; 2]; ALL.len()];
+            let (mut prompt_m, mut least_m) = (NEW_M, [NEW_M; ALL.len()]);
             for (_, other) in self.hits.range(..older) {
-                for (delay, [long, begun]) in least_m.iter_mut().enumerate() {
-                    *long = long.min(off_m(delay, other.under[delay]));
-                    // Motion that begins to differ moves no earlier hit.
-                    let is_late = matches!(ALL[delay].0, Late(_));
-                    if delay > 0 && (lags == 1 || !is_late) {
-                        continue;
-                    }
-                    let prompt = other.arc.iter().chain([&other.under[0]]);
-                    *begun = prompt.map(|place| off_m(delay, *place)).fold(*begun, f64::min);
+                for (delay, least_m) in least_m.iter_mut().enumerate() {
+                    *least_m = least_m.min(off_m(delay, other.under[delay]));
                 }
+                let prompt = other.arc.iter().chain([&other.under[0]]);
+                prompt_m = prompt.map(|place| off_m(0, *place)).fold(prompt_m, f64::min);
             }
-            let [_, prompt_m] = least_m[0];
-            for (lag, bank) in self.better.iter_mut().enumerate().take(lags) {
-                let least_m = least_m.map(|it| it[lag]);
-                let [least, most] =
-                    [f64::min, f64::max].map(|of| least_m.into_iter().fold(least_m[0], of));
-                if least < NEAR_M && most - least > TELLS_M {
-                    for hypothesis in (0..ALL.len()).filter(|it| moved[*it]) {
-                        bank.add(hypothesis, prompt_m - FACTOR * least_m[hypothesis], at_s);
-                    }
+            let [least, most] =
+                [f64::min, f64::max].map(|of| least_m.into_iter().fold(least_m[0], of));
+            if least < NEAR_M && most - least > TELLS_M {
+                for hypothesis in (0..ALL.len()).filter(|it| moved[*it]) {
+                    let better = prompt_m - FACTOR * least_m[hypothesis];
+                    self.better.add(hypothesis, better, at_s);
                 }
             }
             let at = |side: f64| DVec2::from_angle(from[0].heading + side * half_rad);
@@ -229,21 +199,22 @@ impl RangeMotion {
 
     /// Returns how far the robot likely rolls, relative to what its wheels count, and since when.
     pub(super) fn rolls(&self) -> Option<(f64, f64)> {
-        match self.better[0].likeliest(false)? {
+        match self.better.likeliest(false)? {
             (Rolls(share), since_s) => Some((share, since_s)),
             _ => None,
         }
     }
 
     pub(super) fn doubt(&self, doubts: &mut DoubtsSample) {
-        let [long, begun] = &self.better;
         let is_late = |it| matches!(it, Late(_));
-        doubts.late_ranges = long.doubt(is_late).max(begun.doubt(is_late));
-        doubts.miscounted = long.doubt(|it| !is_late(it));
+        doubts.late_ranges = self.better.doubt(is_late).max(self.repeats.doubt());
+        doubts.miscounted = self.better.doubt(|it| !is_late(it));
     }
 
     pub(super) fn judged(&self, sure: bool) -> Option<String> {
-        self.better.iter().find_map(|bank| bank.judged(sure, "sonars and infrared rangers"))
+        let whose = "sonars and infrared rangers";
+        let begun = || Some(self.repeats.likeliest(sure)?.words(whose));
+        self.better.judged(sure, whose).or_else(begun)
     }
 }
 
@@ -317,16 +288,5 @@ mod tests {
     fn sonars_that_become_late_are_doubted_within_2_s() {
         assert_eq!(taken(0..3, 0, 70..84, 84).judged(false), None);
         names(&taken(0..3, 10, 70..84, 84).judged(false).unwrap(), 10);
-    }
-
-    #[test]
-    fn a_reading_jumps_that_changes_by_more_than_the_robots_motion_explains() {
-        let newest = Newest { range_m: 0.0, robot: Pose2::default(), jumped_s: 0.0 };
-        let turned = Pose2 { heading: -1.0, ..Pose2::default() };
-        for (range_m, robot, jumps) in
-            [(0.1, newest.robot, false), (0.4, turned, false), (0.41, turned, true)]
-        {
-            assert_eq!(newest.has_jumped(range_m, robot), jumps, "{range_m}");
-        }
     }
 }

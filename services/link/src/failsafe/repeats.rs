@@ -1,0 +1,72 @@
+//! Detection of readings that repeat earlier ones of their sensor.
+//!
+//! A delay that begins cannot show what is yet to come: readings pause, or those of a while ago come
+//! again. Sensors of a moving robot repeat their readings by chance, but not all with the same lag.
+//! Each lag has a sum of log-likelihood ratios, as in Page's test.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use super::motion_bank::Hypothesis;
+
+/// Least change from one reading to the next that shows motion, and tolerance of a repeated one,
+/// metres.
+const CHANGES_M: f64 = 0.012;
+const SAME_M: f64 = 0.005;
+/// Steps of lags, seconds, the least one, and their number. A repetition counts for the two nearest.
+const STEP_S: f64 = 0.15;
+const LEAST_S: f64 = 0.25;
+const LAGS: usize = 18;
+/// Bound on kept readings of a sensor.
+const MOST_KEPT: usize = 128;
+/// Share of readings that repeat with the lag of a delay.
+const REPEATED: f64 = 0.95;
+/// Sums for doubt and for certainty.
+const LIMITS: [f64; 2] = [8.0, 14.0];
+
+#[derive(Clone, Debug, Default)]
+pub(super) struct Repeats {
+    /// Times and ranges, seconds and metres, by sensor.
+    past: BTreeMap<u8, VecDeque<[f64; 2]>>,
+    sums: [f64; LAGS],
+}
+
+impl Repeats {
+    pub(super) fn take(&mut self, sensor: u8, range_m: f64, at_s: f64) {
+        let past = self.past.entry(sensor).or_default();
+        if past.back().is_some_and(|[_, before_m]| (range_m - before_m).abs() > CHANGES_M) {
+            let mut repeats = [false; LAGS];
+            let same = past.iter().filter(|[_, then_m]| (range_m - then_m).abs() < SAME_M);
+            let lags = same.map(|[then_s, _]| at_s - then_s).filter(|lag_s| *lag_s >= LEAST_S);
+            for lag in lags.map(|lag_s| (lag_s / STEP_S) as usize) {
+                repeats.iter_mut().skip(lag).take(2).for_each(|it| *it = true);
+            }
+            // Chance to repeat with any lag.
+            let count = repeats.iter().filter(|it| **it).count();
+            let chance = (count as f64 / LAGS as f64).min(REPEATED);
+            for (sum, repeats) in self.sums.iter_mut().zip(repeats) {
+                let ratio = match repeats {
+                    true => REPEATED / chance,
+                    false => (1.0 - REPEATED) / (1.0 - chance),
+                };
+                *sum = (*sum + ratio.ln()).clamp(0.0, 2.0 * LIMITS[1]);
+            }
+        }
+        past.push_back([at_s, range_m]);
+        let is_old = |[then_s, _]: &[f64; 2]| at_s - then_s > LAGS as f64 * STEP_S;
+        while past.len() > MOST_KEPT || past.front().is_some_and(is_old) {
+            past.pop_front();
+        }
+    }
+
+    /// Returns the likeliest lag, if it is likely.
+    pub(super) fn likeliest(&self, sure: bool) -> Option<Hypothesis> {
+        let lags = self.sums.iter().zip(0_u8..);
+        let (sum, lag) = lags.max_by(|one, other| one.0.total_cmp(other.0))?;
+        (*sum >= LIMITS[usize::from(sure)]).then(|| Hypothesis::Late(f64::from(lag) * STEP_S))
+    }
+
+    /// Returns the greatest evidence of a lag; 1 is sure.
+    pub(super) fn doubt(&self) -> f64 {
+        self.sums.iter().fold(0.0, |most: f64, sum| most.max(sum / LIMITS[1]))
+    }
+}
