@@ -8,6 +8,7 @@
 use std::fmt;
 
 use iceoryx2::prelude::ZeroCopySend;
+use serde::{Serialize, Serializer};
 
 use super::cdr::{Decoder, Encoder};
 
@@ -47,7 +48,9 @@ pub trait Layout: Copy {
     }
 }
 
-#[derive(Clone, Debug, PartialEq)]
+/// Value of a payload or field. A struct serializes as a map in the order of its fields.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
 pub enum Value {
     Unsigned(u64),
     Signed(i64),
@@ -56,7 +59,11 @@ pub enum Value {
     /// Byte array in a struct: UTF-8, padded with zeros. Invalid bytes are replaced.
     Text(String),
     Array(Vec<Self>),
-    Struct(Vec<(&'static str, Self)>),
+    Struct(#[serde(serialize_with = "as_map")] Vec<(&'static str, Self)>),
+}
+
+fn as_map<S: Serializer>(fields: &[(&'static str, Value)], to: S) -> Result<S::Ok, S::Error> {
+    to.collect_map(fields.iter().map(|(name, value)| (name, value)))
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]

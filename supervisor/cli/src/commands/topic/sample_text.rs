@@ -1,7 +1,6 @@
 //! Formats samples by their layouts: text with one field per line, or one JSON object.
 
 use common::bus::Value;
-use serde::{Serialize, Serializer};
 
 /// Key for the elements, beside the fields of the header.
 const ELEMENTS: &str = "elements";
@@ -19,7 +18,7 @@ pub fn text(fields: &Fields, whole: bool) -> String {
 
 /// Formats a sample. Non-finite numbers are null.
 pub fn json(fields: Fields) -> serde_json::Result<String> {
-    serde_json::to_string(&Json(&Value::Struct(fields)))
+    serde_json::to_string(&Value::Struct(fields))
 }
 
 pub type Fields = Vec<(&'static str, Value)>;
@@ -76,24 +75,6 @@ fn on_one_line(value: &Value, most: usize) -> String {
             let fields =
                 fields.map(|(name, value)| format!("{name}: {}", on_one_line(value, most)));
             format!("{{{}}}", fields.collect::<Vec<_>>().join(", "))
-        }
-    }
-}
-
-struct Json<'a>(&'a Value);
-
-impl Serialize for Json<'_> {
-    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        match self.0 {
-            Value::Unsigned(number) => to.serialize_u64(*number),
-            Value::Signed(number) => to.serialize_i64(*number),
-            Value::Single(number) => to.serialize_f32(*number),
-            Value::Double(number) => to.serialize_f64(*number),
-            Value::Text(text) => to.serialize_str(text),
-            Value::Array(elements) => to.collect_seq(elements.iter().map(Json)),
-            Value::Struct(fields) => {
-                to.collect_map(fields.iter().map(|(name, value)| (name, Json(value))))
-            }
         }
     }
 }
