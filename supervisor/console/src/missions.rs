@@ -52,7 +52,7 @@ pub fn load(name: &str, assignments: &[String]) -> Result<Mission, LookupError> 
 }
 
 /// Inlines the mission's files. Fails if one cannot be read.
-pub fn complete(mission: Mission) -> Result<Mission, LookupError> {
+fn complete(mission: Mission) -> Result<Mission, LookupError> {
     let mission = mission.with_calibration()?;
     let has_map = mission.map.is_some();
     let mission = maps::with_prior_map(mission)?;
@@ -78,23 +78,11 @@ pub fn parsed(text: &str, origin: &str, assignments: &[String]) -> Result<Missio
         // The file's own error names the line.
         Err(of_file) if of_file.is_same_fault(&error) => of_file.into(),
         // No line of the file is at fault.
-        _ => assigned(origin, assignments, &error.without_place()),
+        _ => {
+            let (set, problem) = (assignments.join(" --set "), error.without_place());
+            LookupError::Assigned(format!("{origin} with --set {set}: {problem}"))
+        }
     })?)
-}
-
-fn assigned(name: &str, assignments: &[String], problem: &str) -> LookupError {
-    LookupError::Assigned(format!("{name} with --set {}: {problem}", assignments.join(" --set ")))
-}
-
-/// Returns `None` without assignments.
-pub fn with(mission: &Mission, assignments: &[String]) -> Result<Option<Mission>, LookupError> {
-    if assignments.is_empty() {
-        return Ok(None);
-    }
-    let failed = |problem: String| assigned(&mission.name, assignments, &problem);
-    let table = toml::Table::try_from(mission).map_err(|error| failed(error.to_string()))?;
-    let mission = Mission::parse(&assign(table, assignments)?, Path::new(&mission.name));
-    complete(mission.map_err(|error| failed(error.without_place()))?).map(Some)
 }
 
 fn assign(mut table: toml::Table, assignments: &[String]) -> Result<String, LookupError> {
