@@ -98,7 +98,7 @@ pub fn code(error: &(dyn Error + 'static)) -> Option<&'static str> {
         OperatorError {
             OperatorError::Refused { code, .. } => Some(code),
             OperatorError::Bus(error) => code(error),
-            OperatorError::Stage(_) | OperatorError::System(..) => None,
+            OperatorError::System(..) => None,
         }
         DomainError {
             DomainError::Supervised { .. } => Some("supervised"),

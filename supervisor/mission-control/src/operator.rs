@@ -24,7 +24,6 @@ use common::{
         Action, Cause, LinkSample, MOST_TARGETS, RequestAnswer, RequestKind, RequestSample, Rest,
         RosterEntry, RosterHeader, TargetPoint, name,
     },
-    start::StageError,
     stop_socket::{Answer, Identity, Operator, OwedStop, Request, StopMark},
     topics,
     waiter::Waiter,
@@ -49,9 +48,6 @@ pub enum OperatorError {
     /// The robot, its link or its supervisor refuses; `code` is for scripts.
     #[error("{message}")]
     Refused { code: &'static str, message: String },
-    /// The robot could not be told directly.
-    #[error(transparent)]
-    Stage(#[from] StageError),
     #[error("cannot {0}: {1}")]
     System(&'static str, io::Error),
 }
