@@ -12,7 +12,8 @@ use common::{
 use mission_control::{SupervisorError, operator::OperatorError, recovery::ResumeError};
 use processes::{DomainError, planner_executable::PlannerExecutableError};
 use recording::RecordingError;
-use thiserror::Error;
+
+pub use mission_control::{Refused, refuse};
 
 use super::{missions::LookupError, output::say, robots};
 
@@ -20,24 +21,6 @@ use super::{missions::LookupError, output::say, robots};
 pub type Failure = Box<dyn Error>;
 
 pub type Result<T = (), E = Failure> = std::result::Result<T, E>;
-
-#[derive(Debug, Error)]
-#[error("{message}")]
-pub struct Refused {
-    code: &'static str,
-    message: String,
-}
-
-impl Refused {
-    pub fn new(code: &'static str, message: impl Into<String>) -> Self {
-        let message = message.into();
-        Self { code, message }
-    }
-}
-
-pub fn refuse<T, E: From<Refused>>(code: &'static str, message: impl Into<String>) -> Result<T, E> {
-    Err(Refused::new(code, message).into())
-}
 
 pub fn report(result: Result<ExitCode>) -> ExitCode {
     result.unwrap_or_else(|error| {
@@ -96,7 +79,7 @@ pub fn code(error: &(dyn Error + 'static)) -> Option<&'static str> {
             _ => None,
         }
         OperatorError {
-            OperatorError::Refused { code, .. } => Some(code),
+            OperatorError::Refused(refused) => Some(refused.code),
             OperatorError::Bus(error) => code(error),
             OperatorError::System(..) => None,
         }

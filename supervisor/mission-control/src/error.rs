@@ -6,6 +6,25 @@ use thiserror::Error;
 
 use crate::simulator::SimulatorError;
 
+/// Refusal of the robot, its link, its supervisor or a command; `code` is for scripts.
+#[derive(Debug, Error)]
+#[error("{message}")]
+pub struct Refused {
+    pub code: &'static str,
+    message: String,
+}
+
+impl Refused {
+    pub fn new(code: &'static str, message: impl Into<String>) -> Self {
+        let message = message.into();
+        Self { code, message }
+    }
+}
+
+pub fn refuse<T, E: From<Refused>>(code: &'static str, message: impl Into<String>) -> Result<T, E> {
+    Err(Refused::new(code, message).into())
+}
+
 pub(crate) type Result<T = (), E = SupervisorError> = std::result::Result<T, E>;
 
 #[derive(Debug, Error)]

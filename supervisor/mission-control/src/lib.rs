@@ -52,7 +52,7 @@ pub mod target_list;
 #[cfg(test)]
 mod testing;
 
-pub use error::SupervisorError;
+pub use error::{Refused, SupervisorError, refuse};
 pub use observer::{Heard, Listener, Record};
 pub use progress::Progress;
 pub use run::{Consumer, EndSignals, Finished, StillMoving, end_signals, run, simulate};

@@ -33,6 +33,8 @@ use link::stop_guard;
 use processes::{executable, process};
 use thiserror::Error;
 
+use crate::{Refused, refuse};
+
 /// Timeout for a supervisor, whose roster comes at 5 Hz. With 25 busy processes per core, one took
 /// over 4 s.
 pub const PATIENCE: Duration = Duration::from_secs(10);
@@ -45,27 +47,16 @@ const AGAIN_AFTER: Duration = Duration::from_millis(100);
 pub enum OperatorError {
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// The robot, its link or its supervisor refuses; `code` is for scripts.
-    #[error("{message}")]
-    Refused { code: &'static str, message: String },
+    #[error(transparent)]
+    Refused(#[from] Refused),
     #[error("cannot {0}: {1}")]
     System(&'static str, io::Error),
-}
-
-impl OperatorError {
-    fn refused(code: &'static str, message: impl Into<String>) -> Self {
-        Self::Refused { code, message: message.into() }
-    }
 }
 
 type Result<T = (), E = OperatorError> = std::result::Result<T, E>;
 
 fn system(action: &'static str) -> impl Fn(io::Error) -> OperatorError + Copy {
     move |error| OperatorError::System(action, error)
-}
-
-fn refuse<T>(code: &'static str, message: impl Into<String>) -> Result<T> {
-    Err(OperatorError::refused(code, message))
 }
 
 const fn code(answer: RequestAnswer) -> &'static str {
@@ -335,7 +326,7 @@ fn not_at_rest(robot: &RobotName, seen: &str) -> OperatorError {
         "robot {robot} has the order to stop but was not seen at rest within {} s: {seen}; see `firsthand status`",
         REST_PATIENCE.as_secs()
     );
-    OperatorError::refused("not-at-rest", message)
+    Refused::new("not-at-rest", message).into()
 }
 
 /// Returns whether the robot rests, stopped for the operator or the mission's end.
@@ -421,7 +412,7 @@ fn request(kind: RequestKind) -> RequestSample {
 
 fn refused(robot: &RobotName, answer: RequestAnswer) -> OperatorError {
     let message = format!("the supervisor of robot {robot} refuses: {}", answer.text());
-    OperatorError::refused(code(answer), message)
+    Refused::new(code(answer), message).into()
 }
 
 /// Refuses an order to a mirror.

@@ -11,7 +11,10 @@ use common::{
     samples::*,
     topics,
 };
-use mission_control::operator::{self, OperatorError};
+use mission_control::{
+    Refused,
+    operator::{self, OperatorError},
+};
 use proptest::prelude::*;
 
 use crate::{
@@ -80,7 +83,7 @@ fn orders_to_a_mirror_are_refused_with_the_place_of_the_robot() {
         operator::restart(robot, "mapper").unwrap_err(),
     ] {
         assert!(error.to_string().contains("tls/far:7447"), "{error}");
-        assert!(matches!(error, OperatorError::Refused { code: "mirror", .. }));
+        assert!(matches!(error, OperatorError::Refused(Refused { code: "mirror", .. })));
     }
 }
 

@@ -13,7 +13,10 @@ use common::{
     samples::{DEAD_MAN, TargetPoint},
 };
 use glam::DVec2;
-use mission_control::operator::{self, OperatorError};
+use mission_control::{
+    Refused,
+    operator::{self, OperatorError},
+};
 use ros2::{
     msg::{ComputePathToPoseResult, NavigateToPoseResult},
     participant::Request,
@@ -115,10 +118,10 @@ impl Orders {
 
 fn refusal(error: &OperatorError) -> Refusal {
     let code = match error {
-        OperatorError::Refused { code: "target-outside", .. } => {
+        OperatorError::Refused(Refused { code: "target-outside", .. }) => {
             ComputePathToPoseResult::GOAL_OUTSIDE_MAP
         }
-        OperatorError::Refused { code: "target-in-hazard", .. } => {
+        OperatorError::Refused(Refused { code: "target-in-hazard", .. }) => {
             ComputePathToPoseResult::GOAL_OCCUPIED
         }
         _ => NavigateToPoseResult::UNKNOWN,
@@ -134,7 +137,7 @@ fn perform(robot: &RobotName, order: &Order) -> Result<(), OperatorError> {
             }
             match operator::send_to(robot, &[*to], false) {
                 // A car goes there without a target heading.
-                Err(OperatorError::Refused { code: "no-heading", .. }) => {
+                Err(OperatorError::Refused(Refused { code: "no-heading", .. })) => {
                     operator::send_to(robot, &[TargetPoint { has_heading: 0, ..*to }], false)
                 }
                 result => result,
