@@ -39,9 +39,8 @@ impl Supervisor<'_> {
                 }
                 Next::Begin(RecoveryStep::Reset) => self.publish_state()?,
                 Next::Begin(RecoveryStep::GiveUp) => {
-                    let ending = self.given_up();
-                    if ending.is_some() {
-                        return Ok(ending);
+                    if let Some((_, ending)) = self.given_up() {
+                        return Ok(Some(ending));
                     }
                 }
                 Next::Check => match self.next_stall() {
@@ -74,18 +73,13 @@ impl Supervisor<'_> {
         }
         // A tick without its command may be incomplete here.
         let newest = record.published.tick.filter(|_| in_ticks);
-        let mut found = None;
-        for (pose, guidance) in record.ticks_since(self.stall_watch.tick()) {
-            if newest.is_some_and(|newest| pose.stamp.tick > newest) {
-                break;
-            }
-            let contact = record.has_contact(self.stall_watch.tick(), pose.stamp.tick);
-            if let Some(stall) = self.stall_watch.step(pose, guidance, held, contact) {
-                found = Some(stall);
-                break;
-            }
-        }
-        let stall = found?;
+        let stall = record
+            .ticks_since(self.stall_watch.tick())
+            .take_while(|(pose, _)| newest.is_none_or(|newest| pose.stamp.tick <= newest))
+            .find_map(|(pose, guidance)| {
+                let contact = record.has_contact(self.stall_watch.tick(), pose.stamp.tick);
+                self.stall_watch.step(pose, guidance, held, contact)
+            })?;
         self.tell(&stall);
         Some(stall)
     }
@@ -97,11 +91,12 @@ impl Supervisor<'_> {
         records::append(&self.options.directory, records::STALLS, stall);
     }
 
-    fn given_up(&self) -> Option<Ending> {
+    /// Returns the tick and ending of the stall without a remaining recovery step.
+    fn given_up(&self) -> Option<(u64, Ending)> {
         let stall = self.stall_watch.gave_up()?;
         let words = stall::words(stall.cause(), &self.options.mission.body());
         let reason = format!("target unreachable: {words}");
-        Some(Ending::failed(Outcome::Unreachable, reason))
+        Some((stall.stamp.tick, Ending::failed(Outcome::Unreachable, reason)))
     }
 
     /// Returns the tick and ending of the stall without a remaining recovery step.
@@ -113,8 +108,7 @@ impl Supervisor<'_> {
             && self.stall_watch.gave_up().is_none()
             && self.next_stall().is_some()
         {}
-        let tick = self.stall_watch.gave_up()?.stamp.tick;
-        Some((tick, self.given_up()?))
+        self.given_up()
     }
 
     pub(crate) fn publish_tick_limit(&mut self) -> Result {
