@@ -252,7 +252,6 @@ impl Supervisor<'_> {
     /// Voids arrivals until there is a target.
     pub(crate) fn await_target(&mut self) {
         (self.record.target_number, self.record.arrival) = (u64::MAX, None);
-        self.arrived = None;
     }
 
     pub(crate) fn take_arrival(&mut self) -> bool {
@@ -288,7 +287,6 @@ impl Supervisor<'_> {
 
     pub(crate) fn on_new_target(&mut self) {
         (self.record.target_number, self.record.arrival) = (self.targets.number, None);
-        self.arrived = None;
         // Each target has its own deadline.
         self.state.operator_stopped_s = 0.0;
     }
