@@ -1,4 +1,5 @@
-use mission::grid::{Cell, GridFrame, MAX_CELLS, Window};
+use glam::DVec2;
+use mission::grid::{Cell, CellState, GridFrame, MAX_CELLS, Window};
 
 use super::part::Part;
 
@@ -68,5 +69,14 @@ impl<T: Copy + PartialEq> Replica<T> {
         }
         self.state = Some((frame, version));
         Applied::Window(window)
+    }
+}
+
+/// Safety map, a [`CellState`] a cell.
+impl Replica<u8> {
+    /// Treats places outside the map, and all before the first keyframe, as hazards.
+    pub fn is_hazard(&self, place: DVec2) -> bool {
+        let index = self.frame().and_then(|frame| Some(frame.index(frame.cell_at(place)?)));
+        index.is_none_or(|index| CellState::from_byte(self.cells[index]).is_hazard())
     }
 }

@@ -174,10 +174,11 @@ impl Following {
     ) -> Option<DVec2> {
         let (_, beacon) = self.heard?;
         let least_m = least_m(mission);
-        let around = Around { frame: grid.frame()?, cells: grid.cells(), beacon, least_m };
+        let around = Around { frame: grid.frame()?, grid, beacon, least_m };
         let most_m = self.distance_m + around.frame.resolution_m / 2.0;
         let is_near = |at: DVec2| at.distance(beacon) <= most_m && around.sees(at);
-        let stays = |at: DVec2| at.distance(beacon) >= least_m && around.is_free(at) && is_near(at);
+        let stays =
+            |at: DVec2| at.distance(beacon) >= least_m && !grid.is_hazard(at) && is_near(at);
         let goes_on = if is_near(rest) { arrived } else { current.is_some_and(stays) };
         if goes_on {
             return None;
@@ -190,19 +191,14 @@ impl Following {
 
 struct Around<'a> {
     frame: GridFrame,
-    cells: &'a [u8],
+    grid: &'a Replica<u8>,
     beacon: DVec2,
     least_m: f64,
 }
 
 impl Around<'_> {
-    fn is_free(&self, at: DVec2) -> bool {
-        self.frame.cell_at(at).is_some_and(|cell| self.is_free_cell(cell))
-    }
-
     fn is_free_cell(&self, cell: Cell) -> bool {
-        let byte = self.cells.get(self.frame.index(cell)).copied();
-        byte.is_some_and(|byte| !CellState::from_byte(byte).is_hazard())
+        !CellState::from_byte(self.grid.cells()[self.frame.index(cell)]).is_hazard()
     }
 
     /// Returns whether the followed body is in line of sight from `at`.
@@ -212,7 +208,7 @@ impl Around<'_> {
         let towards = (self.beacon - at).normalize_or_zero();
         (1..=steps).all(|step| {
             let along_m = (f64::from(step) * self.frame.resolution_m).min(way_m);
-            self.is_free(at + towards * along_m)
+            !self.grid.is_hazard(at + towards * along_m)
         })
     }
 
@@ -221,7 +217,7 @@ impl Around<'_> {
     fn nearest(&self, from: DVec2, distance_m: f64) -> Option<DVec2> {
         let start = self.start(from)?;
         let side = self.frame.cells as usize;
-        assert_eq!(self.cells.len(), self.frame.area());
+        assert_eq!(self.grid.cells().len(), self.frame.area());
         let mut costs = vec![u32::MAX; self.frame.area()];
         // A* heuristic: a lower bound to the circle around the beacon.
         let least_cost = |at: DVec2| {

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use common::{
     bus::{Bus, BusError, Reader, Writers},
     clock::Instant,
-    grid::{Applied, CellState, Part, Replica},
+    grid::{Applied, Part, Replica},
     mission::Mission,
     roster,
     samples::{
@@ -203,14 +203,6 @@ impl Record {
     pub fn complaint(&self) -> Option<ComplaintSample> {
         let (complaint, read) = self.complaint?;
         (read.elapsed() < ComplaintSample::LASTS).then_some(complaint)
-    }
-
-    /// Treats places outside the map as hazards.
-    pub(crate) fn is_hazard(&self, place: DVec2) -> bool {
-        let frame = self.grid.frame();
-        frame
-            .and_then(|frame| Some(frame.index(frame.cell_at(place)?)))
-            .is_none_or(|index| CellState::from_byte(self.grid.cells()[index]).is_hazard())
     }
 
     pub(crate) fn sure_arrival(&self, mission: &Mission) -> Option<Arrived> {

@@ -194,7 +194,7 @@ impl Supervisor<'_> {
         let way = pose.pose().axis().rotate(stick.position().clamp_length_max(1.0)) * reach_m;
         let steps = (way.length() / mission.grid_frame().resolution_m).ceil();
         let points = (1..=steps as u32).map(|step| here + way * (f64::from(step) / steps));
-        let is_free = |at: &DVec2| !record.is_hazard(*at);
+        let is_free = |at: &DVec2| !record.grid.is_hazard(*at);
         let free = points.take_while(is_free).last().unwrap_or(here + way);
         let point = [TargetPoint::at(free)];
         if let Some(answer) = target_list::refusal(Some(&point), self.why_held(), mission, record) {

@@ -413,7 +413,7 @@ pub(crate) fn refusal(
         if !mission.contains(place) {
             return Some(RequestAnswer::Outside);
         }
-        record.is_hazard(place).then_some(RequestAnswer::InHazard)
+        record.grid.is_hazard(place).then_some(RequestAnswer::InHazard)
     })
 }
 

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use common::{
     bus::Reader,
-    grid::{Applied, CellState, Replica},
+    grid::{Applied, Replica},
     outputs::Outputs,
     readers,
     samples::{GridHeader, GuidanceSample, GuidanceStatus, PoseSample, TargetSample},
@@ -79,7 +79,7 @@ impl Planner {
         let direction = to_target.normalize_or(DVec2::X);
         let ahead = AHEAD_M.min(to_target.length()) / 10.0;
         let mut points = (1..=10).map(|step| here + direction * ahead * f64::from(step));
-        let (status, direction) = match points.all(|at| self.is_free(at)) {
+        let (status, direction) = match points.all(|at| !self.map.is_hazard(at)) {
             true => (GuidanceStatus::Along, direction),
             false => (GuidanceStatus::Unreachable, DVec2::ZERO),
         };
@@ -92,12 +92,6 @@ impl Planner {
             grid_version: header.part.version,
             ..GuidanceSample::for_pose(pose, header, &self.target)
         }
-    }
-
-    fn is_free(&self, at: DVec2) -> bool {
-        let frame = self.map.frame();
-        let index = frame.and_then(|frame| Some(frame.index(frame.cell_at(at)?)));
-        index.is_some_and(|index| !CellState::from_byte(self.map.cells()[index]).is_hazard())
     }
 }
 
