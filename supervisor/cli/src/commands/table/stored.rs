@@ -32,17 +32,13 @@ static RESULTS: &[(&str, &str)] = stored! {
 pub fn markdown(name: &str, text: &str) -> String {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let header = reader.headers().cloned().unwrap_or_default();
-    let rows: Vec<Vec<String>> = reader
-        .records()
-        .flatten()
-        .map(|row| row.iter().skip(1).map(str::to_owned).collect())
-        .collect();
-    match name {
-        "capabilities" => rows.iter().map(|row| capability(row)).collect(),
-        "versions" => rows.iter().map(|row| version(row)).collect(),
-        "figures" => rows.iter().map(|row| figure(row)).collect(),
-        _ => table(header.iter().skip(1), &rows),
-    }
+    let header = match name {
+        "capabilities" | "versions" | "figures" => String::new(),
+        _ => table_header(&header.iter().skip(1).collect::<Vec<_>>()),
+    };
+    let records = reader.records().flatten();
+    let rows = records.map(|row| line(name, &row.iter().skip(1).collect::<Vec<_>>()));
+    header + &rows.collect::<String>()
 }
 
 pub fn results() -> String {
@@ -50,50 +46,36 @@ pub fn results() -> String {
     printed.collect::<Vec<_>>().join("\n")
 }
 
-fn capability(row: &[String]) -> String {
-    let [text, verdict, tests] = row else {
-        return String::new();
-    };
-    let said = match tests.as_str() {
-        "" => text.to_owned(),
-        tests => format!("{text}: {}", named(tests)),
-    };
-    item(&format!("{verdict}: {said}"))
+fn table_header(columns: &[&str]) -> String {
+    format!("| {} |\n|{}\n", columns.join(" | "), "---|".repeat(columns.len()))
+}
+
+/// Returns a row of the file called `name`: an item of a list, or a row of a table.
+fn line(name: &str, row: &[&str]) -> String {
+    match (name, row) {
+        ("capabilities", [text, verdict, ""]) => item(&format!("{verdict}: {text}")),
+        ("capabilities", [text, verdict, tests]) => {
+            item(&format!("{verdict}: {text}: {}", named(tests)))
+        }
+        // How another version of a file or robot is handled. `STATES` is the version of states.
+        ("versions", [what, version, another, tests]) => {
+            let states = checkpoint::VERSION.escape_ascii().to_string();
+            let version = version.replace("STATES", &states);
+            item(&format!("{what} ({version}): {another}: {}", named(tests)))
+        }
+        // A figure above its command.
+        ("figures", [what, realism, n, figure, command]) => {
+            let realism = if realism.is_empty() { String::new() } else { format!("{realism}, ") };
+            format!("{}  `{command}`\n", item(&format!("{what} ({realism}n = {n}): {figure}")))
+        }
+        _ => format!("| {} |\n", row.join(" | ")),
+    }
 }
 
 fn named(tests: &str) -> String {
     tests.split(' ').map(|test| format!("`{test}`")).collect::<Vec<_>>().join(" ")
 }
 
-/// Describes how another version of a file or robot is handled. `STATES` is the version of states.
-fn version(row: &[String]) -> String {
-    let [what, version, another, tests] = row else {
-        return String::new();
-    };
-    let version = version.replace("STATES", &checkpoint::VERSION.escape_ascii().to_string());
-    item(&format!("{what} ({version}): {another}: {}", named(tests)))
-}
-
-/// Prints a figure above its command.
-fn figure(row: &[String]) -> String {
-    let [what, realism, n, figure, command] = row else {
-        return String::new();
-    };
-    let realism = match realism.as_str() {
-        "" => String::new(),
-        realism => format!("{realism}, "),
-    };
-    format!("{}  `{command}`\n", item(&format!("{what} ({realism}n = {n}): {figure}")))
-}
-
-fn table<'a>(header: impl Iterator<Item = &'a str>, rows: &[Vec<String>]) -> String {
-    let header: Vec<&str> = header.collect();
-    let mut table = format!("| {} |\n|{}\n", header.join(" | "), "---|".repeat(header.len()));
-    for row in rows {
-        table += &format!("| {} |\n", row.join(" | "));
-    }
-    table
-}
 
 #[cfg(test)]
 mod tests {
