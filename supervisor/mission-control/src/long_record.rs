@@ -1,37 +1,26 @@
 //! Records of each tick in bounded memory: older ticks are thinned out.
 
-use common::{ground_truth::GroundTruthTick, samples::PoseSample};
+use common::ground_truth::GroundTruthTick;
 
 /// Maximum length: 10 minutes at 7 Hz, 0.7 MB. The newest half stays complete and holds the tick
 /// that ends a run.
 const MOST_TICKS: usize = 4096;
 
-pub(crate) trait Recorded: Copy {
-    /// Merges this tick and the `next`; `None` if both are needed.
-    fn with(self, next: Self) -> Option<Self>;
+/// Merges a tick and the `next`; `None` if both are needed.
+pub(crate) fn merged(tick: GroundTruthTick, next: GroundTruthTick) -> Option<GroundTruthTick> {
+    let clearance_m = tick.clearance_m.min(next.clearance_m);
+    (tick.contacts == next.contacts).then_some(GroundTruthTick { clearance_m, ..tick })
 }
 
-impl Recorded for PoseSample {
-    fn with(self, _: Self) -> Option<Self> {
-        Some(self)
-    }
-}
-
-impl Recorded for GroundTruthTick {
-    fn with(self, next: Self) -> Option<Self> {
-        let clearance_m = self.clearance_m.min(next.clearance_m);
-        (self.contacts == next.contacts).then_some(Self { clearance_m, ..self })
-    }
-}
-
-/// Appends `tick`; a full record first merges pairs of older ticks.
-pub(crate) fn push<T: Recorded>(record: &mut Vec<T>, tick: T) {
+/// Appends `tick`; a full record first merges pairs of older ticks. `merged` gives `None` for a
+/// pair that stays.
+pub(crate) fn push<T: Copy>(record: &mut Vec<T>, tick: T, merged: impl Fn(T, T) -> Option<T>) {
     if record.len() >= MOST_TICKS {
         let (older, newer) = record.split_at(MOST_TICKS / 2);
         let mut thinned = Vec::with_capacity(MOST_TICKS);
         for pair in older.chunks(2) {
             let one = match *pair {
-                [tick, next] => tick.with(next),
+                [tick, next] => merged(tick, next),
                 _ => None,
             };
             match one {
@@ -57,7 +46,7 @@ mod tests {
             let clearance_m = if tick == 777 { 0.1 } else { 1.0 };
             let contacts = u64::from(tick >= 5001);
             let truth = GroundTruthTick { tick, clearance_m, contacts, ..Default::default() };
-            push(&mut record, truth);
+            push(&mut record, truth, merged);
             assert!(record.len() <= MOST_TICKS);
         }
         let ticks: Vec<u64> = record.iter().map(|truth| truth.tick).collect();

@@ -164,7 +164,7 @@ impl Observer {
         while let Some(pose) = self.pose.next_sample()? {
             stages.on_output(topics::POSE.spec().writer, pose.stamp.tick);
             record.pose = Some(pose);
-            long_record::push(&mut record.poses, pose);
+            long_record::push(&mut record.poses, pose, |older, _| Some(older));
         }
         // Poses are computed from link samples, so these are read last.
         while let Some(contact) = self.contact.next_sample()? {

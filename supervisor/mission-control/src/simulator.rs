@@ -188,7 +188,7 @@ impl GroundTruth {
                 // The first tick may come together with the header.
                 written += line.len();
             } else if let Ok(tick) = serde_json::from_slice(line) {
-                long_record::push(&mut self.ticks, tick);
+                long_record::push(&mut self.ticks, tick, long_record::merged);
             }
         }
         let ticks = &self.unfinished[written..];
