@@ -81,22 +81,19 @@ pub fn end_signals() -> Result<EndSignals> {
 
 /// Process that should receive every sample of a run, which waits for it.
 ///
-/// Both calls return on a signal or after their own timeout.
+/// Both calls return on a signal or after their own timeout. By default they do nothing.
 pub trait Consumer {
     /// Starts the consumer, after the bus and before the stages.
-    fn attach(&mut self, signals: &Signals);
+    fn attach(&mut self, _signals: &Signals) {}
+
     /// Waits until the consumer has read all samples.
     ///
     /// Called in lockstep every [`CAUGHT_UP_EVERY`] ticks, fewer than the bus keeps, and always
     /// before the stages end: a writer's unread samples vanish with it.
-    fn catch_up(&mut self, signals: &Signals);
+    fn catch_up(&mut self, _signals: &Signals) {}
 }
 
-impl Consumer for () {
-    fn attach(&mut self, _: &Signals) {}
-
-    fn catch_up(&mut self, _: &Signals) {}
-}
+impl Consumer for () {}
 
 pub(crate) const CAUGHT_UP_EVERY: u64 = 32;
 
