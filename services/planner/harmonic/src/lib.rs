@@ -130,7 +130,7 @@ pub use crate::{
     policy::Policy,
     scaled::Scaled,
     screening::{MIN_SCREENING_CELLS, Screening},
-    solver::{Phase, Settings, Solver},
+    solver::{Settings, Solver},
     verification::Verification,
 };
 #[cfg(feature = "testing")]

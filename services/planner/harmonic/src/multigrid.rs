@@ -83,6 +83,8 @@ pub(crate) struct Multigrid<R> {
     corrects: bool,
     /// Whether u falls so steeply that second visits save no cycle.
     is_steep: bool,
+    /// Number of all cycles so far.
+    pub cycles: usize,
     simd: Simd,
 }
 
@@ -224,29 +226,25 @@ impl<R: Real> Multigrid<R> {
         self.start_from_sources();
     }
 
-    /// Runs until every cell has settled and `after` finds no fault, or for `most` cycles. After
-    /// each cycle, `after` receives whether to check the field. It returns the largest residual as
-    /// a multiple of its limit, if that is too large.
+    /// Runs until every cell has settled and `check` finds no fault, or for `most` cycles. `check`
+    /// returns the largest residual as a multiple of its limit, if that is too large.
     pub(crate) fn converge(
         &mut self,
         (first_check, most): (usize, usize),
         cancellation: &Cancellation,
-        mut after: impl FnMut(&mut Self, bool) -> Option<f64>,
+        mut check: impl FnMut(&mut Self) -> Option<f64>,
     ) -> Result<(), SolveError> {
         assert!(first_check <= most);
         let mut next_check = first_check;
         for cycle in 1..=most {
             cancellation.check()?;
+            self.cycles += 1;
             let judged = cycle >= next_check;
             let settled = self.cycle(judged) == 0 && judged;
-            let checked = settled || cycle == most;
-            match after(self, checked) {
-                Some(excess) if checked => {
-                    let cycles = excess.ln() / PER_CYCLE.ln();
-                    next_check = cycle + cycles.clamp(1.0, BETWEEN_CHECKS) as usize;
-                }
-                None if checked => break,
-                _ => {}
+            if settled || cycle == most {
+                let Some(excess) = check(self) else { break };
+                let cycles = excess.ln() / PER_CYCLE.ln();
+                next_check = cycle + cycles.clamp(1.0, BETWEEN_CHECKS) as usize;
             }
         }
         Ok(())

@@ -81,7 +81,6 @@ pub(crate) fn solve(
     known: Store,
     levels: &mut Multigrid<f32>,
     cancellation: &Cancellation,
-    cycled: &mut dyn FnMut(),
 ) -> Result<Store, SolveError> {
     let mut bands = Bands::new(domain, &known);
     drop(known);
@@ -97,11 +96,7 @@ pub(crate) fn solve(
         let here = bands.rectangle(&unknowns);
         levels.reshape(here.width, here.height);
         bands.load(here, top, &unknowns, (&mut inverse, &mut values), levels);
-        levels.converge((FIRST_CHECK, SINGLE_CYCLES), cancellation, |levels, checked| {
-            cycled();
-            if !checked {
-                return None;
-            }
+        levels.converge((FIRST_CHECK, SINGLE_CYCLES), cancellation, |levels| {
             levels.finish();
             levels.unload(1.0, &mut values);
             let check = verification::check_above_with(here.width, &values, &inverse, CHECKED);

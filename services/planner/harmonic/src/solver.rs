@@ -48,22 +48,6 @@ impl Default for Settings {
     }
 }
 
-/// Step of a solve that has just ended, for callers that measure time.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
-#[non_exhaustive]
-pub enum Phase {
-    /// Target-independent set-up is ready.
-    SetUp,
-    /// Multigrid cycle has ended.
-    Cycled,
-    /// Field was computed.
-    Solved,
-    /// Field was checked.
-    ///
-    /// After a failed check, more phases follow.
-    Verified,
-}
-
 /// Solver of fields.
 ///
 /// Between solves it keeps the target-independent set-up and updates it where cells changed.
@@ -93,7 +77,7 @@ impl Solver {
         domain: &Domain,
         cancellation: &Cancellation,
     ) -> Result<Field, SolveError> {
-        self.solve_observed(domain, cancellation, &mut |_| {})
+        self.run(domain, None, cancellation)
     }
 
     /// Solves `domain` from the field of a similar map, which saves most multigrid cycles.
@@ -108,35 +92,23 @@ impl Solver {
         near: &Field,
         cancellation: &Cancellation,
     ) -> Result<Field, SolveError> {
-        self.run(domain, Some(near), cancellation, &mut |_| {})
+        self.run(domain, Some(near), cancellation)
     }
 
-    /// Calls `observe` at the end of each phase.
-    ///
-    /// # Errors
-    /// See [`solve`](Self::solve).
-    pub fn solve_observed(
-        &mut self,
-        domain: &Domain,
-        cancellation: &Cancellation,
-        observe: &mut dyn FnMut(Phase),
-    ) -> Result<Field, SolveError> {
-        self.run(domain, None, cancellation, observe)
+    /// Returns the number of multigrid cycles of all solves so far, a measure of their work.
+    pub fn cycles(&self) -> usize {
+        self.single.levels.cycles + self.double.levels.cycles
     }
 }
 
 struct Task<'a> {
     threads: NonZeroUsize,
     job: Job<'a>,
-    observe: &'a mut dyn FnMut(Phase),
 }
 
 impl Task<'_> {
-    fn check(&mut self, store: &Store) -> Check {
-        (self.observe)(Phase::Solved);
-        let check = verification::check(self.job.domain, store, self.threads);
-        (self.observe)(Phase::Verified);
-        check
+    fn check(&self, store: &Store) -> Check {
+        verification::check(self.job.domain, store, self.threads)
     }
 }
 
@@ -157,18 +129,17 @@ impl Solver {
         domain: &Domain,
         near: Option<&Field>,
         cancellation: &Cancellation,
-        observe: &mut dyn FnMut(Phase),
     ) -> Result<Field, SolveError> {
         let Settings { threads, memory_limit } = self.settings;
         cancellation.check()?;
         let job = Job::new(domain, memory_limit, cancellation);
-        let mut task = Task { threads, job, observe };
+        let task = Task { threads, job };
         if let Some(near) = near.filter(|near| near.fits(domain)) {
             let method = near.verification().method;
             // The shape of the map alone decides the cost of the factorisation, so the usual plan
             // applies.
             if method != Method::Multifrontal {
-                let (store, check, method) = self.multigrid(method, Some(near), &mut task)?;
+                let (store, check, method) = self.multigrid(method, Some(near), &task)?;
                 if check.holds() {
                     return Ok(Field::new(domain, store, &check, method));
                 }
@@ -183,8 +154,8 @@ impl Solver {
         let mut failed = Check::default();
         for &method in methods {
             let (store, check, method) = match method {
-                Method::Multifrontal => self.multifrontal(ordered.take(), &mut task)?,
-                method => self.multigrid(method, None, &mut task)?,
+                Method::Multifrontal => self.multifrontal(ordered.take(), &task)?,
+                method => self.multigrid(method, None, &task)?,
             };
             if check.holds() {
                 return Ok(Field::new(domain, store, &check, method));
@@ -200,14 +171,13 @@ impl Solver {
     fn multifrontal(
         &mut self,
         planned: Option<Ordered>,
-        task: &mut Task<'_>,
+        task: &Task<'_>,
     ) -> Result<Solved, SolveError> {
         let job = task.job;
         let ordered = match planned {
             Some(ordered) => ordered,
             None => multifrontal::order(job)?,
         };
-        (task.observe)(Phase::SetUp);
         let mut store = multifrontal::solve(job, &ordered, None, &mut self.multifrontal)?;
         let mut check = task.check(&store);
         if !check.holds() {
@@ -225,7 +195,7 @@ impl Solver {
         &mut self,
         method: Method,
         near: Option<&Field>,
-        task: &mut Task<'_>,
+        task: &Task<'_>,
     ) -> Result<Solved, SolveError> {
         let job = task.job;
         if method == Method::MultigridDouble {
@@ -241,12 +211,10 @@ impl Solver {
             let store = multifrontal::solve(job, &ordered, known, &mut self.multifrontal)?;
             (store, Method::MultigridAndMultifrontal)
         } else {
-            let cycled = &mut || (task.observe)(Phase::Cycled);
             // The bands overwrite the levels, so the next solve sets them up again.
             self.single.width = 0;
             let levels = &mut self.single.levels;
-            let store =
-                multigrid_bands::solve(job.domain, store, levels, job.cancellation, cycled)?;
+            let store = multigrid_bands::solve(job.domain, store, levels, job.cancellation)?;
             (store, Method::MultigridBands)
         };
         let check = task.check(&store);
@@ -262,13 +230,12 @@ where
     /// `most_cycles` from scratch.
     fn solve(
         &mut self,
-        task: &mut Task<'_>,
+        task: &Task<'_>,
         near: Option<&Field>,
         most_cycles: usize,
     ) -> Result<(Store, Check), SolveError> {
         let (threads, Job { domain, cancellation, .. }) = (task.threads, task.job);
         let levels = self.prepare(domain);
-        (task.observe)(Phase::SetUp);
         let cycles = match near {
             Some(near) => {
                 let width = domain.width();
@@ -284,11 +251,7 @@ where
             }
         };
         let mut found = (Store::from(Vec::new()), Check::default());
-        levels.converge(cycles, cancellation, |levels, checked| {
-            (task.observe)(Phase::Cycled);
-            if !checked {
-                return None;
-            }
+        levels.converge(cycles, cancellation, |levels| {
             levels.finish();
             let values = levels.read(domain.target(), R::of(BLOCKED));
             assert_eq!(values.len(), domain.blocked().len());

@@ -109,7 +109,7 @@ fn others_than(domain: &Domain) -> [Domain; 2] {
 fn full_row(name: &str, domain: &Domain) {
     let cells = domain.blocked().len();
     let mut solver = Solver::default();
-    let Measured { total: scratch, wavefront, field, .. } =
+    let Measured { total: scratch, wavefront, field } =
         measured(&mut solver, domain, runs(cells).min(12));
     let target = fastest(runs(cells), || {
         solve_with(&mut solver, domain);

@@ -1,70 +1,50 @@
-//! Cycles and checks of a solve, and growth of time and memory with the map.
+//! Time of a solve beside a wavefront's, and growth of time and memory with the map.
 
 use std::process::Command;
-use std::time::Instant;
 
 use crate::support::{Kind, Map, solve, solve_with};
-use harmonic::{Cancellation, Domain, Field, Phase, Solver};
+use harmonic::{Domain, Field, Solver};
 
-use crate::{others_than, runs, wavefront};
+use crate::{fastest, others_than, runs, wavefront};
 
-/// Milliseconds and counts of the fastest solve, milliseconds of the wavefront, and the field.
+/// Milliseconds of the fastest solve and of the fastest wavefront, and the field.
 pub(crate) struct Measured {
     pub total: f64,
-    pub cycles: usize,
-    pub checks: usize,
     pub wavefront: f64,
     pub field: Field,
-}
-
-/// Returns milliseconds, cycles and checks of a solve.
-fn split(solver: &mut Solver, domain: &Domain) -> (f64, usize, usize) {
-    let (mut cycles, mut checks) = (0, 0);
-    let start = Instant::now();
-    solver
-        .solve_observed(domain, &Cancellation::new(), &mut |phase| {
-            cycles += usize::from(phase == Phase::Cycled);
-            checks += usize::from(phase == Phase::Verified);
-        })
-        .expect("a field");
-    (start.elapsed().as_secs_f64() * 1e3, cycles, checks)
 }
 
 /// Measures solves from scratch and wavefronts in turn.
 pub(crate) fn measured(solver: &mut Solver, domain: &Domain, runs: usize) -> Measured {
     let others = others_than(domain);
-    let (mut best, mut wavefront, mut reached) = ((f64::INFINITY, 0, 0), f64::INFINITY, 0);
+    let (mut total, mut wavefront, mut reached) = (f64::INFINITY, f64::INFINITY, 0);
     for _ in 0..runs {
         for other in &others {
             solve_with(solver, other);
         }
-        let here = split(solver, domain);
-        if here.0 < best.0 {
-            best = here;
-        }
+        total = total.min(fastest(1, || drop(solve_with(solver, domain))));
         let (time, cells) = wavefront::time(domain, 2);
         (wavefront, reached) = (wavefront.min(time), cells);
     }
     let field = solve_with(solver, domain);
     assert_eq!(reached, field.verification().reachable, "cells reached");
-    let (total, cycles, checks) = best;
-    Measured { total, cycles, checks, wavefront, field }
+    Measured { total, wavefront, field }
 }
 
 pub(crate) fn growth_table() {
     println!(
         "\nGrowth with the map: ms per million cells, and bytes a cell that a solver and its field hold at most"
     );
-    println!("map           N method          cycles     ms a million  wavefronts  bytes a cell");
+    println!("map           N method             ms a million  wavefronts  bytes a cell");
     for kind in [Kind::Drums, Kind::Office] {
         for n in [128, 256, 512, 1024, 2048, 4096] {
             let domain = Map::generate(kind, n, n, 1).domain();
             let bytes = bytes_of_a_process(&format!("{kind:?}:{n}"));
-            let Measured { total, cycles, wavefront, field, .. } =
+            let Measured { total, wavefront, field } =
                 measured(&mut Solver::default(), &domain, runs(n * n).min(12));
             let method = field.verification().method.name();
             println!(
-                "{:<8} {n:>6} {method:<14} {cycles:>7} {:>16.2} {:>11.2} {:>13}",
+                "{:<8} {n:>6} {method:<14} {:>16.2} {:>11.2} {:>13}",
                 format!("{kind:?}"),
                 total * 1e6 / (n * n) as f64,
                 total / wavefront,
