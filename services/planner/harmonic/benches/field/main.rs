@@ -29,8 +29,8 @@ mod wavefront;
 use std::time::Instant;
 
 use crate::split::{Measured, measured};
-use crate::support::{Kind::*, Map, solve_with};
-use harmonic::{Cell, Domain, Solver};
+use crate::support::{Kind::*, Map};
+use harmonic::{Cell, Domain};
 
 /// Returns the milliseconds of the fastest of `runs` calls.
 fn fastest(runs: usize, mut call: impl FnMut()) -> f64 {
@@ -43,7 +43,7 @@ fn fastest(runs: usize, mut call: impl FnMut()) -> f64 {
 }
 
 fn runs(cells: usize) -> usize {
-    (4_000_000 / cells).clamp(3, 50)
+    (4_000_000 / cells).clamp(3, 12)
 }
 
 fn main() {
@@ -81,7 +81,7 @@ fn full_table() {
         "\nFull solves without screening: set-up + solve + verification, ms, and as multiples of a wavefront's time"
     );
     println!(
-        "map                          cells method           scratch    target wavefront      x      x  dijkstra   log10 u"
+        "map                          cells method           scratch wavefront      x  dijkstra   log10 u"
     );
     let kinds = [Empty, Drums, Office, Trap]
         .into_iter()
@@ -108,19 +108,13 @@ fn others_than(domain: &Domain) -> [Domain; 2] {
 
 fn full_row(name: &str, domain: &Domain) {
     let cells = domain.blocked().len();
-    let mut solver = Solver::default();
-    let Measured { total: scratch, wavefront, field } =
-        measured(&mut solver, domain, runs(cells).min(12));
-    let target = fastest(runs(cells), || {
-        solve_with(&mut solver, domain);
-    });
+    let Measured { total: scratch, wavefront, field } = measured(domain, runs(cells));
     let dijkstra = others::dijkstra(domain);
     println!(
-        "{name:<24} {:>9} {:<14} {scratch:>9.3} {target:>9.3} {wavefront:>9.3} {:>6.2} {:>6.2} {dijkstra:>9.2} {:>9.1}",
+        "{name:<24} {:>9} {:<14} {scratch:>9.3} {wavefront:>9.3} {:>6.2} {dijkstra:>9.2} {:>9.1}",
         format!("{}x{}", domain.width(), domain.height()),
         field.verification().method.name(),
         scratch / wavefront,
-        target / wavefront,
         field.log10_u_min(),
     );
 }

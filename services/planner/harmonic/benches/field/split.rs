@@ -15,18 +15,19 @@ pub(crate) struct Measured {
 }
 
 /// Measures solves from scratch and wavefronts in turn.
-pub(crate) fn measured(solver: &mut Solver, domain: &Domain, runs: usize) -> Measured {
+pub(crate) fn measured(domain: &Domain, runs: usize) -> Measured {
+    let mut solver = Solver::default();
     let others = others_than(domain);
     let (mut total, mut wavefront, mut reached) = (f64::INFINITY, f64::INFINITY, 0);
     for _ in 0..runs {
         for other in &others {
-            solve_with(solver, other);
+            solve_with(&mut solver, other);
         }
-        total = total.min(fastest(1, || drop(solve_with(solver, domain))));
+        total = total.min(fastest(1, || drop(solve_with(&mut solver, domain))));
         let (time, cells) = wavefront::time(domain, 2);
         (wavefront, reached) = (wavefront.min(time), cells);
     }
-    let field = solve_with(solver, domain);
+    let field = solve_with(&mut solver, domain);
     assert_eq!(reached, field.verification().reachable, "cells reached");
     Measured { total, wavefront, field }
 }
@@ -40,8 +41,7 @@ pub(crate) fn growth_table() {
         for n in [128, 256, 512, 1024, 2048, 4096] {
             let domain = Map::generate(kind, n, n, 1).domain();
             let bytes = bytes_of_a_process(&format!("{kind:?}:{n}"));
-            let Measured { total, wavefront, field } =
-                measured(&mut Solver::default(), &domain, runs(n * n).min(12));
+            let Measured { total, wavefront, field } = measured(&domain, runs(n * n));
             let method = field.verification().method.name();
             println!(
                 "{:<8} {n:>6} {method:<14} {:>16.2} {:>11.2} {:>13}",

@@ -5,7 +5,7 @@ use crate::support::{
     Kind::{self, *},
     Map,
 };
-use harmonic::{Domain, Solver};
+use harmonic::Domain;
 
 use crate::split::{Measured, measured};
 
@@ -61,7 +61,7 @@ pub(crate) fn table(real: &[(String, Domain)]) {
 
 fn row(name: &str, domain: &Domain) -> (f64, String) {
     let cells = domain.blocked().len() as f64;
-    let Measured { total, wavefront, field } = measured(&mut Solver::default(), domain, RUNS);
+    let Measured { total, wavefront, field } = measured(domain, RUNS);
     let ratio = total / wavefront;
     let line = format!(
         "{name:<28} {ratio:>6.2} {total:>9.2} {:>7.1} {:<28} {:>9.1}",

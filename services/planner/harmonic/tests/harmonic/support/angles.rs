@@ -7,9 +7,7 @@ use super::{cells, reference::angle};
 /// Angles in degrees, over the cells that can reach the target.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Angles {
-    pub p50: f64,
     pub p99: f64,
-    pub max: f64,
     /// Share of angles above one degree.
     pub off: f64,
     /// Maximum away from saddle points.
@@ -39,12 +37,12 @@ impl Angles {
             angles.push(off);
         }
         angles.sort_by(f64::total_cmp);
-        let Some(&max) = angles.last() else {
+        let Some(last) = angles.len().checked_sub(1) else {
             return Self::default();
         };
-        let at = |share: f64| angles[((angles.len() - 1) as f64 * share) as usize];
+        let p99 = angles[(last as f64 * 0.99) as usize];
         let off = angles.iter().filter(|angle| **angle > 1.0).count() as f64 / angles.len() as f64;
-        Self { off, p50: at(0.5), p99: at(0.99), max, clear_max }
+        Self { off, p99, clear_max }
     }
 }
 
