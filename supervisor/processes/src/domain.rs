@@ -372,8 +372,6 @@ fn check_shared_memory(mount: &str, cells: usize) -> Result<(), DomainError> {
 
 #[cfg(test)]
 mod tests {
-    use std::thread;
-
     use common::{bus::BusError, stop_socket::StopSocket};
 
     use super::*;

@@ -104,7 +104,6 @@ fn number(rust: &str) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use common::topics;
 
     #[test]
     fn a_schema_lists_the_fields_of_the_layout_in_their_order() {

@@ -1,8 +1,5 @@
 use super::*;
-use common::{
-    samples::{Stamp, TurnSample},
-    wire::COUNT_CYCLE,
-};
+use common::samples::{Stamp, TurnSample};
 use glam::DVec4;
 use std::{f64::consts::PI, path::Path};
 

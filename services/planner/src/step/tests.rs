@@ -7,7 +7,7 @@ use GuidanceStatus::{Along, Look, Unreachable, Waiting, WayOut};
 use common::{
     bus::Stamp,
     grid::{CellState, Part},
-    samples::{BaseResponseSample, Mover, TargetPoint},
+    samples::{BaseResponseSample, Mover},
 };
 use glam::dvec2;
 

@@ -1,6 +1,6 @@
 //! Tests of the robot as a state machine.
 
-use common::wire::{COUNT_CYCLE, Decoder, Quantity, Request, Stream, Targets, counts_between};
+use common::wire::{Decoder, Quantity, Request, Stream, Targets, counts_between};
 
 use proptest::prelude::*;
 

@@ -2,7 +2,6 @@ use common::{
     grid::{CellState, Part},
     samples::{GuidanceSample, GuidanceStatus, PoseSample, Stamp},
 };
-use glam::DVec2;
 
 use super::*;
 use crate::testing;

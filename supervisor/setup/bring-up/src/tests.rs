@@ -5,15 +5,13 @@ use std::{
     str::FromStr,
 };
 
+use super::*;
 use common::{
     driver::range_reading,
     kinematics::Pose2,
-    mission::{Channel, Mission, Protocol, SensorKind},
+    mission::{Channel, Protocol, SensorKind},
     samples::ScanHeader,
 };
-use glam::DVec2;
-
-use super::*;
 
 const BEAMS: usize = 180;
 const RATE_HZ: f64 = 10.0;

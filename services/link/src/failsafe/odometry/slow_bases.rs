@@ -1,7 +1,5 @@
 //! Tests of slow and late bases with an unstated response, and of encoders that die on them.
 
-use common::mission::ModelledSpeed;
-
 use super::*;
 use crate::testing::*;
 

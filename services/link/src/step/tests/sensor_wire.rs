@@ -1,6 +1,6 @@
 //! Tests of a laser on its own wire.
 
-use common::driver::{Driver, Heard, LaserScan, WireTally};
+use common::driver::{Heard, LaserScan};
 
 use super::*;
 
