@@ -40,9 +40,6 @@ pub struct Arguments {
     /// Print the disturbances and the result of each run.
     #[arg(long)]
     verbose: bool,
-    /// Run the mission in lockstep without any disturbance.
-    #[arg(long)]
-    undisturbed: bool,
     /// Record the run, for `firsthand replay` and the page.
     #[arg(long, value_name = "FILE", conflicts_with = "count")]
     out: Option<PathBuf>,
@@ -130,10 +127,7 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     let began = Instant::now();
     let mut totals = Totals::default();
     for seed in (0..arguments.count).map(|nth| first.wrapping_add(nth)) {
-        let scenario = match arguments.undisturbed {
-            true => Scenario::lockstep(&mission),
-            false => Scenario::draw(&mission, seed),
-        };
+        let scenario = Scenario::draw(&mission, seed);
         let ran = run(&scenario, arguments)?;
         totals.add(&scenario, &ran);
         if arguments.verbose {
