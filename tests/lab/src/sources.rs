@@ -29,9 +29,6 @@ pub struct Arguments {
     /// Fixes per second of mission time; 0 for none.
     #[arg(long, value_name = "HZ", default_value_t = 1.0)]
     fixes: f64,
-    /// Standard deviation of a fix in x and in y, metres.
-    #[arg(long, value_name = "M", default_value_t = 0.05)]
-    fix_error: f64,
     /// Share of fixes that are off by one metre.
     #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
     jumps: f64,
@@ -39,11 +36,10 @@ pub struct Arguments {
     /// per second and a scale of 1.005.
     #[arg(long, value_name = "NOISE")]
     gyro: Option<f64>,
-    /// Seed of the noise.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
 }
 
+/// Standard deviation of a fix in x and in y.
+const FIX_ERROR_M: f64 = 0.05;
 const GYRO_BIAS_DEG_S: f64 = 0.02;
 const GYRO_SCALE: f64 = 1.005;
 /// Maximum poses and ground-truth ticks that wait for each other.
@@ -57,7 +53,7 @@ pub fn main(arguments: &Arguments) -> Result {
     let mut robot = Follower::new(arguments.robot.domain(), "sources", &topics::POSE, open);
     let mut source = Source {
         arguments,
-        chance: Random::new(arguments.seed, 23),
+        chance: Random::new(1, 23),
         file: Tail::default(),
         truth: Vec::new(),
         poses: Vec::new(),
@@ -129,19 +125,19 @@ impl Source<'_> {
         truth: &GroundTruthTick,
         writers: &mut Writers,
     ) -> Result {
-        let Arguments { fixes: rate_hz, fix_error, jumps, gyro, .. } = *self.arguments;
+        let Arguments { fixes: rate_hz, jumps, gyro, .. } = *self.arguments;
         let (tick, time) = (pose.stamp.tick, pose.stamp.time());
         let now_s = time.seconds();
         if rate_hz > 0.0 && now_s >= self.next_fix_s {
             self.next_fix_s = now_s + 1.0 / rate_hz;
             let direction = std::f64::consts::TAU * self.chance.share();
             let off = if self.chance.share() < jumps { 1.0 } else { 0.0 };
-            let variance = fix_error * fix_error;
+            let variance = FIX_ERROR_M * FIX_ERROR_M;
             let fix = FixSample {
                 capture_ns: time.0,
                 source: name("simulated"),
-                x_m: truth.x + fix_error * self.normal() + off * direction.cos(),
-                y_m: truth.y + fix_error * self.normal() + off * direction.sin(),
+                x_m: truth.x + FIX_ERROR_M * self.normal() + off * direction.cos(),
+                y_m: truth.y + FIX_ERROR_M * self.normal() + off * direction.sin(),
                 heading_rad: f64::NAN,
                 covariance: [variance, 0.0, 0.0, variance, 0.0, 0.0],
                 ..FixSample::default()
