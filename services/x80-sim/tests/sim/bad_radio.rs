@@ -1,25 +1,18 @@
 //! Tests of a whole simulated robot behind a bad radio.
 
 use common::{clock::Pace, ground_truth::GroundTruthTick, wire::Report};
+use x80_sim::InMemory;
 
-use crate::support::{Sim, forward, receive, reports};
+use crate::support::{forward, mission, port, reports};
 
-/// Drives in lockstep by so many commands. Returns received bytes and ground truth.
-fn lock_step(mission: &str, commands: usize) -> (Vec<u8>, Vec<GroundTruthTick>) {
-    let sim = Sim::start(mission, Pace::Max);
-    let host = sim.host();
-    let mut bytes = Vec::new();
+/// Drives in lockstep by so many commands. Returns the bytes for the host, and the ground truth.
+fn lock_step(text: &str, commands: usize) -> (Vec<u8>, Vec<GroundTruthTick>) {
+    let mut robot = InMemory::start(&mission(text), Pace::Max).unwrap();
     for _ in 0..commands {
-        host.send(&forward(400, 150)).unwrap();
-        let mut moved = false;
-        while !moved {
-            let datagram = receive(&host);
-            moved = reports(&datagram).iter().any(|report| matches!(report, Report::Motor(_)));
-            bytes.extend(datagram);
-        }
+        robot.hear(port(7), &forward(400, 150)).unwrap();
     }
-    // Ground truth is written before a tick's frames.
-    (bytes, sim.finish())
+    let bytes = robot.sent().flat_map(|(_, datagram)| datagram).collect();
+    (bytes, robot.truth().collect())
 }
 
 #[test]

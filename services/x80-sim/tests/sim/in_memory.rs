@@ -1,7 +1,5 @@
 //! Robot without a process: it has the bytes of one.
 
-use std::net::SocketAddr;
-
 use common::{
     clock::Pace,
     ground_truth::GroundTruthTick,
@@ -11,7 +9,7 @@ use common::{
 use rplidar_protocol::START;
 use x80_sim::InMemory;
 
-use crate::support::{Sim, encoded, forward, mission};
+use crate::support::{Sim, encoded, forward, mission, port};
 
 #[test]
 fn at_max_its_datagrams_and_its_truth_are_those_of_a_process() {
@@ -34,7 +32,7 @@ fn at_max_its_datagrams_and_its_truth_are_those_of_a_process() {
     ] {
         let sim = Sim::start(text, Pace::Max);
         // Of the robot, and of its laser.
-        let hosts = [7, 8].map(|port| (SocketAddr::from(([127, 0, 0, 1], port)), sim.host()));
+        let hosts = [7, 8].map(|number| (port(number), sim.host()));
         let mut robot = InMemory::start(&mission(text), Pace::Max).unwrap();
         assert_eq!(robot.next_due_ns(), None);
         let mut buffer = vec![0; 65_536];

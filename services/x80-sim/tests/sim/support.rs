@@ -31,6 +31,11 @@ pub(crate) fn mission(text: &str) -> Mission {
     mission
 }
 
+/// Returns a host's end of a wire to a robot in memory.
+pub(crate) fn port(number: u16) -> SocketAddr {
+    SocketAddr::from(([127, 0, 0, 1], number))
+}
+
 pub(crate) fn encoded(command: Command) -> Vec<u8> {
     let mut bytes = Vec::new();
     command.encode(Addressing::Numbered, &mut bytes);
@@ -67,7 +72,7 @@ impl Sim {
         let options = SimOptions {
             mission: mission(text),
             pace,
-            listen: SocketAddr::from(([127, 0, 0, 1], 0)),
+            listen: port(0),
             transport: Transport::Udp,
             own_user_only: false,
             keep: None,
