@@ -404,8 +404,11 @@ fn behind_a_proxy_a_page_is_served_under_its_name_alone() {
     let behind_proxy = Some("robot.example".to_owned());
     let options = Arguments { behind_proxy, ..options("127.0.0.1:0") };
     let page = Page::open(&options, noting(&Noted::default())).unwrap();
-    let answer = ask(&page, &["GET / HTTP/1.1", "Host: robot.example"]);
+    assert!(page.access.addresses().starts_with("watch https://robot.example/#"));
+    let from = |origin| ask(&page, &["GET / HTTP/1.1", "Host: robot.example", origin]);
+    let answer = from("Origin: https://robot.example");
     assert_eq!(status(&answer), "200");
     assert!(answer.contains("connect-src wss://robot.example;"), "{answer}");
+    assert_eq!(status(&from("Origin: http://robot.example")), "403");
     assert_eq!(status(&get(&page, "/")), "421");
 }
