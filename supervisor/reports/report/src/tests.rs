@@ -54,28 +54,13 @@ fn a_page_has_every_tick_the_maps_a_field_and_the_metrics() {
 }
 
 #[test]
-fn a_report_tells_of_a_stage_that_was_killed_and_refers_to_nothing() {
-    let page = golden_of("stall-and-kill").html();
-    assert!(!page.contains("src=\"") && !page.contains("href=\"/"), "it refers to something");
-    let (messages, _) = messages(&page);
+fn a_report_tells_of_a_stage_that_was_killed() {
+    let (messages, _) = messages(&golden_of("stall-and-kill").html());
     let told = messages.iter().filter_map(|message| message["events"].as_array()).flatten();
     let told: Vec<_> = told.map(|event| format!("{} {}", event["of"], event["text"])).collect();
     for event in ["\"mapper\" \"generation 1 died (signal 9)", "\"mapper\" \"generation 2 runs\""] {
         assert!(told.iter().any(|it| it.starts_with(event)), "{told:?}");
     }
-}
-
-#[test]
-fn text_of_a_recording_is_never_markup() {
-    let mut content = golden();
-    let hostile = "</script><script>alert(\"&\")</script>";
-    content.mission.name = hostile.to_owned();
-    content.remarks.push(hostile.to_owned());
-    content.summary.insert("outcome".to_owned(), hostile.into());
-    let html = content.html();
-    assert!(!html.contains("<script>alert"));
-    let (messages, _) = messages(&html);
-    assert_eq!(messages.last().unwrap()["remarks"][0], hostile);
 }
 
 #[test]
