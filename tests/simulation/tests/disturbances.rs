@@ -127,13 +127,6 @@ fn a_robot_whose_counts_jump_in_motion_stands_and_its_arrival_is_unsure() {
 }
 
 #[test]
-fn a_robot_that_ignores_velocity_0_is_made_to_stand_by_other_means() {
-    let ran = ran("", &[fault_at(3.0, IgnoresZero), ask_at(3.5, Stop), at(8.0, End)]);
-    let last = ran.truth.last().unwrap();
-    assert!(last.v.abs() < 0.01, "{} m/s", last.v);
-}
-
-#[test]
 fn a_robot_that_a_broken_planner_or_map_holds_comes_free_by_a_new_planner_or_a_reset_map() {
     for method in ["evidential", "paper"] {
         for (stage, fault) in [
