@@ -10,7 +10,7 @@ use std::{
     },
 };
 
-use serde_json::Value;
+use common::ground_truth::{GroundTruthHeader, GroundTruthTick};
 
 use super::{PATIENCE, firsthand, kill, start_piped, wait_until};
 
@@ -21,7 +21,7 @@ pub struct Robot {
     pub listening: String,
     pub laser: Option<String>,
     /// Ground truth records, received at once because the robot waits for a slow reader.
-    truth: Receiver<Value>,
+    truth: Receiver<GroundTruthTick>,
     went: f64,
 }
 
@@ -51,21 +51,15 @@ impl Robot {
         let mut process = firsthand(&["sim", mission, "--ground-truth"]);
         let mut process = start_piped(process.args(arguments).stderr(Stdio::null()));
         let output = BufReader::new(process.stdout.take().unwrap());
+        let mut lines = output.lines().map_while(Result::ok);
+        let header = serde_json::from_str(&lines.next().unwrap());
+        let GroundTruthHeader { listening, laser } = header.unwrap();
         let (tell, truth) = channel();
         std::thread::spawn(move || {
-            let lines = output.lines().map_while(Result::ok);
-            let mut values = lines.map_while(|line| serde_json::from_str(&line).ok());
-            values.try_for_each(|value| tell.send(value))
+            let mut ticks = lines.map_while(|line| serde_json::from_str(&line).ok());
+            ticks.try_for_each(|tick| tell.send(tick))
         });
-        let header: Value = truth.recv_timeout(PATIENCE).unwrap();
-        Self {
-            process,
-            scheme: "udp://",
-            listening: header["listening"].as_str().unwrap().to_owned(),
-            laser: header["laser"].as_str().map(str::to_owned),
-            truth,
-            went: 0.0,
-        }
+        Self { process, scheme: "udp://", listening, laser, truth, went: 0.0 }
     }
 
     pub fn wait_until_driven(&mut self, metres: f64) {
@@ -96,14 +90,12 @@ impl Robot {
     }
 }
 
-fn rests(truth: &Value) -> bool {
-    let speed = |key: &str| truth[key].as_f64().unwrap().abs();
-    speed("v") < 0.01 && speed("omega") < 0.05
+fn rests(truth: &GroundTruthTick) -> bool {
+    truth.v.abs() < 0.01 && truth.omega.abs() < 0.05
 }
 
-fn from_start(truth: &Value) -> f64 {
-    let metres = |axis: &str| truth[axis].as_f64().unwrap();
-    metres("x").hypot(metres("y"))
+fn from_start(truth: &GroundTruthTick) -> f64 {
+    truth.x.hypot(truth.y)
 }
 
 /// Forwarder of datagrams between link and robot, until the process ends.
