@@ -14,33 +14,24 @@ use ros2::{
 
 const ROBOT: &str = "target = [3, 0]\nrobot.model = 'turtlebot3-burger'\nrobot.protocol = 'ros2'\nrobot.address = 'ros2'\n";
 /// Stamp 12.5 s, at (1.5, -0.25) with heading 0.5, 0.2 m/s and -0.1 rad/s.
-const ODOMETRY: [&str; 3] = [
-    "000100000c0000000065cd1d050000006f646f6d004764b30a000000626173655f6c696e6b0064af64468401000000000000f83f000000000000d0bf000000000000000000000000000000000000000000000000\
-     7715f3d4eeaacf3fa1ee7d9f5401ef3f",
-    "9a9999999999c93f00000000000000000000000000000000000000000000000000000000000000009a9999999999b9bf",
-    "",
+const ODOMETRY: [&[u8]; 2] = [
+    b"\0\x01\0\0\x0c\0\0\0\0e\xcd\x1d\x05\0\0\0odom\0Gd\xb3\x0a\0\0\0base_link\0d\xafdF\x84\x01\0\0\0\0\0\0\xf8?\0\0\0\0\0\0\xd0\xbf\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0w\x15\xf3\xd4\xee\xaa\xcf?\xa1\xee}\x9fT\x01\xef?",
+    b"\x9a\x99\x99\x99\x99\x99\xc9?\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\x9a\x99\x99\x99\x99\x99\xb9\xbf",
 ];
 /// 4 beams from 0 in steps of 1.5: 1 m, infinite, NaN and 0; from 0.16 m to 8 m.
-const SCAN: &str = "0001000000000000000000000a000000626173655f7363616e00b11e000000000000c0400000c03f00000000000000000ad7233e00000041040000000000803f0000807f0000c07f00000000\
-     020000000000803f0000803f";
+const SCAN: &[u8] = b"\0\x01\0\0\0\0\0\0\0\0\0\0\x0a\0\0\0base_scan\0\xb1\x1e\0\0\0\0\0\0\xc0@\0\0\xc0?\0\0\0\0\0\0\0\0\x0a\xd7#>\0\0\0A\x04\0\0\0\0\0\x80?\0\0\x80\x7f\0\0\xc0\x7f\0\0\0\0\x02\0\0\0\0\0\x80?\0\0\x80?";
 /// 1.25 m of 0.02 to 4 m.
-const RANGE: &str =
-    "000100000000000000000000050000006e6f7365000070650000003f0ad7a33c000080400000a03f00000000";
+const RANGE: &[u8] =
+    b"\0\x01\0\0\0\0\0\0\0\0\0\0\x05\0\0\0nose\0\0pe\0\0\0?\x0a\xd7\xa3<\0\0\x80@\0\0\xa0?\0\0\0\0";
 /// 12.1 V.
-const BATTERY: &str = "0001000000000000000000000200000062009b199a99414100000000000000000000000000000000000000000000000000000001\
-     000000000000000001000000000000000100000000";
+const BATTERY: &[u8] = b"\0\x01\0\0\0\0\0\0\0\0\0\0\x02\0\0\0b\0\x9b\x19\x9a\x99AA\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\x01\0\0\0\0\0\0\0\0\x01\0\0\0\0\0\0\0\x01\0\0\0\0";
 /// 0.2 m/s and -0.5 rad/s.
-const TWIST: &str = "000100009a9999999999c93f0000000000000000000000000000000000000000000000000000000000000000000000000000e0bf";
-const TWIST_STAMPED: &str = "0001000000000000000000000100000000d197199a9999999999c93f0000000000000000000000000000000000000000000000000000000000000000000000000000e0bf";
-
-fn bytes(hex: &str) -> Vec<u8> {
-    let digits = hex.as_bytes().chunks_exact(2);
-    digits.map(|pair| u8::from_str_radix(str::from_utf8(pair).unwrap(), 16).unwrap()).collect()
-}
+const TWIST: &[u8] = b"\0\x01\0\0\x9a\x99\x99\x99\x99\x99\xc9?\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\xe0\xbf";
+const TWIST_STAMPED: &[u8] = b"\0\x01\0\0\0\0\0\0\0\0\0\0\x01\0\0\0\0\xd1\x97\x19\x9a\x99\x99\x99\x99\x99\xc9?\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\xe0\xbf";
 
 fn odometry() -> Vec<u8> {
-    let covariance = vec![0; 36 * 8];
-    [bytes(ODOMETRY[0]), covariance.clone(), bytes(ODOMETRY[1]), covariance].concat()
+    let covariance = [0; 36 * 8];
+    [ODOMETRY[0], &covariance, ODOMETRY[1], &covariance].concat()
 }
 
 fn header(stamp_ms: u32) -> Header {
@@ -116,17 +107,17 @@ fn what_rclpy_serialises_is_read_as_what_was_said() {
     let odometry = format!("{:.12?}", Odometry::read(&odometry()).unwrap());
     let said = "Odometry { stamp_ns: 12500000000, pose: [1.500000000000, -0.250000000000, 0.500000000000], twist: [0.200000000000, -0.100000000000] }";
     assert_eq!(odometry, said);
-    let scan = format!("{:?}", Scan::read(&bytes(SCAN)).unwrap());
+    let scan = format!("{:?}", Scan::read(SCAN).unwrap());
     let said = "Scan { stamp_ns: 0, beam_s: 0.0, fan: (0.0, 1.5), least_m: 0.16, most_m: 8.0, ranges: [1.0, inf, NaN, 0.0], is_reversed: false }";
     assert_eq!(scan, said);
-    assert_eq!(read_range(&bytes(RANGE)), Ok(1.25));
-    assert_eq!(BatteryState::decode(&bytes(BATTERY)).unwrap().voltage, 12.1);
+    assert_eq!(read_range(RANGE), Ok(1.25));
+    assert_eq!(BatteryState::decode(BATTERY).unwrap().voltage, 12.1);
 }
 
 #[test]
 fn a_message_that_ends_anywhere_is_refused_and_none_makes_the_driver_panic_or_allocate() {
     let mut driver = driver(SONAR);
-    let needed = [(ODOM, odometry(), 724), (LASER, bytes(SCAN), 88), (NOSE, bytes(RANGE), 40)];
+    let needed = [(ODOM, odometry(), 724), (LASER, SCAN.to_vec(), 88), (NOSE, RANGE.to_vec(), 40)];
     for (row, payload, needed) in needed {
         for length in 0..payload.len() {
             let heard = driver.said(row, &payload[..length]);
@@ -157,7 +148,7 @@ fn a_refusal_names_the_topic_what_was_wrong_and_the_remedy() {
         (ODOM, odometry_from(1000, f64::NAN), "/odom: the pose is out of range; publish metres"),
         (
             LASER,
-            bytes(SCAN),
+            SCAN.to_vec(),
             "/scan: the scan has 4 beams from 0.0 degrees in steps of 85.944, and the mission's laser has 360 beams from -180.0 degrees in steps of 1.000; correct",
         ),
         (9, odometry(), "belongs to an unknown topic"),
@@ -304,7 +295,7 @@ fn a_scan_of_16384_beams_is_taken_whole() {
 #[test]
 fn ranges_and_the_battery_are_those_of_their_topics() {
     let mut driver = driver(SONAR);
-    let nose = driver.said(NOSE, &bytes(RANGE)).readings[0];
+    let nose = driver.said(NOSE, RANGE).readings[0];
     assert_eq!((nose.status(), nose.range_m), (RangeStatus::Measured, 1.25));
     for (range, status) in [
         (f32::INFINITY, RangeStatus::Nothing),
@@ -313,18 +304,18 @@ fn ranges_and_the_battery_are_those_of_their_topics() {
         (1e38, RangeStatus::Invalid),
         (0.01, RangeStatus::Invalid),
     ] {
-        let mut payload = bytes(RANGE);
+        let mut payload = RANGE.to_vec();
         payload[36..40].copy_from_slice(&range.to_le_bytes());
         assert_eq!(driver.said(NOSE, &payload).readings[0].status(), status, "{range}");
     }
-    let power = driver.said(POWER, &bytes(BATTERY)).power.unwrap();
+    let power = driver.said(POWER, BATTERY).power.unwrap();
     assert!((power.motor_v - 12.1).abs() < 1e-6);
 }
 
 #[test]
 fn a_command_is_the_bytes_of_rclpy_and_one_of_nothing_is_a_stop() {
-    assert_eq!(write_twist(0.2, -0.5, false), bytes(TWIST));
-    let mut stamped = bytes(TWIST_STAMPED);
+    assert_eq!(write_twist(0.2, -0.5, false), TWIST);
+    let mut stamped = TWIST_STAMPED.to_vec();
     // Fast DDS leaves padding unchanged.
     stamped[17..20].fill(0);
     assert_eq!(write_twist(0.2, -0.5, true), stamped);
@@ -416,7 +407,7 @@ fn what_others_tell_the_robot_is_theirs_and_no_sign_of_the_robot() {
     let other = |moves| Some(Commander { number: [7; 16], moves });
     for (stamped, twist) in [(false, TWIST), (true, TWIST_STAMPED)] {
         let mut driver = driver(&format!("robot.ros2.stamped = {stamped}\n{SONAR}"));
-        let heard = command(&mut driver, &bytes(twist));
+        let heard = command(&mut driver, twist);
         assert_eq!((heard.commander, heard.anything, heard.refused), (other(true), false, None));
         let stand = driver.velocity([0, 0], Duration::from_millis(250));
         assert_eq!(command(&mut driver, &stand).commander, other(false));
