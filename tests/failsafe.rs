@@ -9,7 +9,10 @@ use crate::support::{
     PATIENCE, Run, STAGES, assert_no_restart, logged, not_run, wait_until_all_ended,
     wire::{Proxy, Robot},
 };
-use common::wire::{Command, Decoder};
+use common::{
+    process_status,
+    wire::{Command, Decoder},
+};
 use rustix::process::Signal;
 
 /// Duration of a command: `robot.command_limit_s`.
@@ -153,9 +156,8 @@ fn a_frozen_supervisor_leads_to_a_robot_at_rest_and_a_thawed_one_lets_it_go_on()
 
 /// Returns whether this process and its children ignore `signal`. Under `nohup` they ignore SIGHUP.
 fn ignores(signal: Signal) -> bool {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap();
-    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    let mask = u64::from_str_radix(mask.unwrap().trim(), 16).unwrap();
+    let mask = process_status::field("self", "SigIgn").unwrap();
+    let mask = u64::from_str_radix(&mask, 16).unwrap();
     mask >> (signal.as_raw() - 1) & 1 == 1
 }
 
