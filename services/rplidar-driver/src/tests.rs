@@ -1,7 +1,6 @@
 use std::path::Path;
 
 use common::mission::Mission;
-use proptest::prelude::*;
 
 use super::*;
 
@@ -136,26 +135,4 @@ fn a_turn_without_an_end_is_given_up() {
     driver.hear(&node(0, 1.0));
     driver.hear(&node(1, 1.0).repeat(5000));
     assert!(driver.turn.is_none());
-}
-
-proptest! {
-    #[test]
-    fn no_bytes_make_the_driver_panic_or_grow(pieces in proptest::collection::vec(hostile(), 0..12)) {
-        let mut driver = scanning("");
-        for piece in pieces {
-            for scan in driver.hear(&piece).scans {
-                prop_assert_eq!(scan.beams.len(), NODES);
-                prop_assert!(scan.beams.iter().all(|beam| beam.is_nan() || *beam > 0.0));
-            }
-        }
-        driver.hear(&[turn(|_| 1.0), turn(|_| 1.0)].concat());
-        prop_assert_eq!(hears(&mut driver, 2.0).len(), 2);
-    }
-}
-
-fn hostile() -> impl Strategy<Value = Vec<u8>> {
-    let near = (0..200_usize).prop_map(|cut| turn(|_| 1.0)[cut % 180..].to_vec());
-    let any = proptest::collection::vec(any::<u8>(), 0..300);
-    let flags = proptest::collection::vec(prop_oneof![Just(0xa5), Just(0x5a), Just(1_u8)], 0..99);
-    prop_oneof![near, any, flags, Just(Answer::Scan.encode()), Just(vec![0xa5, 0x5a, 0x14])]
 }
