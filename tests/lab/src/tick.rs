@@ -28,7 +28,7 @@ pub struct Arguments {
     mission: String,
     /// Measure only at this many ticks per second, or back to back: max.
     #[arg(long, value_name = "HZ", value_parser = parse_hz)]
-    rate: Option<Regime>,
+    rate: Option<Hz>,
     /// Number of rounds. Each round measures ticks and bare hops, because the load of a shared
     /// machine varies.
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
@@ -69,62 +69,42 @@ pub fn main(arguments: &Arguments) -> Result {
     }
     let rate_hz = missions::load(&arguments.mission, &arguments.set)?.robot.rate_hz;
     (0..arguments.busy).for_each(|_| drop(thread::spawn(busy::run)));
-    let both = || vec![Regime(None), Regime(Some(rate_hz))];
-    let regimes = arguments.rate.map_or_else(both, |regime| vec![regime]);
-    let reports = regimes.into_iter().map(|regime| measure(regime, arguments, &robot, rate_hz));
+    let rates = arguments.rate.map_or_else(|| vec![None, Some(rate_hz)], |hz| vec![hz]);
+    let reports = rates.into_iter().map(|hz| measure(hz, arguments, &robot, rate_hz));
     let reports = reports.collect::<Result<Vec<_>>>()?;
     reports.iter().try_for_each(|report| crate::print(report, arguments.json))
 }
 
-fn measure(
-    regime: Regime,
-    arguments: &Arguments,
-    robot: &RobotName,
-    rate_hz: f64,
-) -> Result<Report> {
+fn measure(hz: Hz, arguments: &Arguments, robot: &RobotName, rate_hz: f64) -> Result<Report> {
     let (mut hops, mut rounds, mut used) = (Histogram::default(), Vec::new(), None);
-    let period = regime.period();
+    let pace = hz.map_or(Pace::Max, |hz| Pace::Rate(hz / rate_hz));
+    let period = hz.map(|hz| Duration::from_secs_f64(1.0 / hz));
     let trips = if period.is_some() { PACED_TRIPS } else { TRIPS };
     for _ in 0..arguments.rounds {
         let round = hops::measure(robot, trips, period)?;
         hops.add(&round.counts, round.max_ns);
-        let (ticks, its) = mission::measure(arguments, robot, regime.pace(rate_hz))?;
+        let (ticks, its) = mission::measure(arguments, robot, pace)?;
         rounds.push(ticks);
         used = its;
     }
-    Report::new(regime, &hops, &rounds, used)
+    Report::new(hz, &hops, &rounds, used)
 }
 
 /// None if back to back. The rate decides whether caches are warm and cores awake.
-#[derive(Clone, Copy, Debug)]
-struct Regime(Option<f64>);
+type Hz = Option<f64>;
 
 /// Back-to-back trips per round.
 const TRIPS: u64 = 2000;
 const PACED_TRIPS: u64 = 50;
 
-impl Regime {
-    fn pace(self, rate_hz: f64) -> Pace {
-        self.0.map_or(Pace::Max, |hz| Pace::Rate(hz / rate_hz))
-    }
-
-    fn period(self) -> Option<Duration> {
-        Some(Duration::from_secs_f64(1.0 / self.0?))
-    }
-
-    fn name(self) -> String {
-        self.0.map_or("back to back".to_owned(), |hz| format!("at {hz} Hz"))
-    }
-}
-
 const SLOWEST_HZ: f64 = 0.1;
 /// A tick takes up to a millisecond, so faster rates are back to back.
 const FASTEST_HZ: f64 = 1000.0;
 
-fn parse_hz(text: &str) -> Result<Regime, String> {
+fn parse_hz(text: &str) -> Result<Hz, String> {
     match text.parse() {
-        _ if text == "max" => Ok(Regime(None)),
-        Ok(hz) if (SLOWEST_HZ..=FASTEST_HZ).contains(&hz) => Ok(Regime(Some(hz))),
+        _ if text == "max" => Ok(None),
+        Ok(hz) if (SLOWEST_HZ..=FASTEST_HZ).contains(&hz) => Ok(Some(hz)),
         _ => Err(format!("{text} is not a rate; give {SLOWEST_HZ} to {FASTEST_HZ} Hz, or max")),
     }
 }
@@ -161,7 +141,7 @@ struct Report {
 
 impl Report {
     /// Reports medians of the rounds' quantiles, because machine load varies.
-    fn new(regime: Regime, hops: &Histogram, rounds: &[Times], used: Option<Used>) -> Result<Self> {
+    fn new(hz: Hz, hops: &Histogram, rounds: &[Times], used: Option<Used>) -> Result<Self> {
         let hops = Times::new("five bare hops on the bus", hops.total(), hops.into())?;
         let quantiles = Quantiles {
             p50: median(rounds.iter().map(|round| round.p50_us)),
@@ -171,7 +151,7 @@ impl Report {
         let count = rounds.iter().map(|round| round.count).sum();
         let tick = Times::new("a tick, datagram in to datagram out", count, quantiles)?;
         Ok(Self {
-            regime: regime.name(),
+            regime: hz.map_or("back to back".to_owned(), |hz| format!("at {hz} Hz")),
             ratio: rounded(tick.p50_us / hops.p50_us),
             ratio_p99: rounded(tick.p99_us / hops.p99_us),
             used,
@@ -185,18 +165,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_rate_asked_for_is_a_pace_of_the_mission_and_a_period_of_the_hops() {
-        let regime = parse_hz("7").unwrap();
-        assert_eq!(regime.pace(3.5), Pace::Rate(2.0));
-        assert_eq!(regime.period(), Some(Duration::from_secs_f64(1.0 / 7.0)));
-        assert_eq!(regime.name(), "at 7 Hz");
-        let at_once = parse_hz("max").unwrap();
-        assert_eq!((at_once.pace(7.0), at_once.period()), (Pace::Max, None));
-        assert_eq!(at_once.name(), "back to back");
-    }
-
-    #[test]
-    fn a_rate_that_is_none_is_refused() {
+    fn a_rate_is_a_number_or_max_and_one_that_is_none_is_refused() {
+        assert_eq!([parse_hz("7"), parse_hz("max")], [Ok(Some(7.0)), Ok(None)]);
         for text in ["0", "-7", "nan", "inf", "1e9", "seven", ""] {
             assert!(parse_hz(text).is_err(), "{text}");
         }
