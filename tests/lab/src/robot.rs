@@ -59,6 +59,9 @@ pub fn simulated(directory: &Path, mission: &Mission) -> Result<Simulator> {
     Ok(Simulator::start(firsthand(&[]), None, directory, mission, pace, None)?)
 }
 
+/// Interval of looks at a run that is waited for.
+const LOOK_EVERY: Duration = Duration::from_secs(1);
+
 pub struct Run {
     pub process: Process,
     directory: PathBuf,
@@ -74,10 +77,10 @@ impl Run {
         Ok(Self { process, directory: directory.to_owned() })
     }
 
-    pub fn wait(mut self, every: Duration, mut look: impl FnMut()) -> Result<Self> {
+    pub fn wait(mut self, mut look: impl FnMut()) -> Result<Self> {
         while self.process.try_reap().or_cannot("reap")?.is_none() {
             look();
-            poll::is_readable(&self.process, every)?;
+            poll::is_readable(&self.process, LOOK_EVERY)?;
         }
         Ok(self)
     }

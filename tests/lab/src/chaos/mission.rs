@@ -45,7 +45,7 @@ fn command(options: &Options, seed: u64, pace: Pace, out: &Path) -> Command {
 fn undisturbed(options: &Options, seed: u64) -> Result<Summary> {
     let directory = options.directory.join("undisturbed");
     let command = command(options, seed, Pace::Max, &directory);
-    let summary = Run::start(command, &directory, false)?.wait(PATIENCE, || ())?.summary()?;
+    let summary = Run::start(command, &directory, false)?.wait(|| ())?.summary()?;
     fs::remove_dir_all(directory).or_cannot("remove its directory")?;
     Ok(summary)
 }

@@ -286,7 +286,7 @@ impl Job<'_> {
         }
         let run = |records| -> Result<Vec<Run>> {
             let started: Result<Vec<_>> = robots.iter().map(|robot| robot.start(records)).collect();
-            started?.into_iter().map(|run| run.wait(LINE_EVERY, || ())).collect()
+            started?.into_iter().map(|run| run.wait(|| ())).collect()
         };
         let mut rows = Vec::new();
         for (robot, run) in robots.iter().zip(run(records)?) {

@@ -20,7 +20,6 @@ use crate::{
     robot::{self, Run},
 };
 
-const LOOK_EVERY: Duration = Duration::from_secs(1);
 const STOPS_WITHIN: Duration = Duration::from_millis(100);
 
 /// Returns tick times and resources; no resources for a short mission.
@@ -38,7 +37,7 @@ pub fn measure(
     let _consumers: Vec<_> = (0..arguments.consumers).map(|_| consumer(robot)).collect();
     let run = Run::start(command, &files, !arguments.no_record)?;
     let mut processes = ProcessSet::of(run.process.id());
-    let summary = run.wait(LOOK_EVERY, || processes.look())?.summary()?;
+    let summary = run.wait(|| processes.look())?.summary()?;
     let times = Times::new("a mission's ticks", summary.ticks, summary.tick_latency_us)?;
     Ok((times, processes.used()))
 }
