@@ -3,7 +3,7 @@
 //! It treats unknown cells as free, like the harmonic planner. Unlike it with the evidential
 //! method, it does not look around before driving.
 
-pub mod belief;
+pub mod map;
 pub mod planner;
 pub mod process;
 pub mod wavefront;

@@ -1,12 +1,13 @@
 //! Planner for comparison, with the shared map and path guidance.
 
 use common::{
+    grid::{Applied, Replica},
     mission::{Method, Mission},
-    samples::{GuidanceSample, GuidanceStatus, PoseSample, TargetSample},
+    samples::{GridHeader, GuidanceSample, GuidanceStatus, PoseSample, TargetSample},
 };
 use glam::DVec2;
 
-use crate::baselines::{belief::Belief, wavefront};
+use crate::baselines::{map::Map, wavefront};
 
 /// Speed of a robot that leaves a hazard, m/s, as of the harmonic planner with the evidential
 /// method.
@@ -24,7 +25,8 @@ pub enum Way {
 pub struct Baseline {
     pub target: Option<TargetSample>,
     looks_around: bool,
-    pub belief: Belief,
+    pub grid: Replica<u8>,
+    header: GridHeader,
 }
 
 impl Baseline {
@@ -32,22 +34,28 @@ impl Baseline {
         Self {
             target: None,
             looks_around: mission.method == Method::Evidential,
-            belief: Belief::default(),
+            grid: Replica::default(),
+            header: GridHeader::default(),
         }
     }
 
-    pub fn guidance(&self, sample: &PoseSample) -> GuidanceSample {
-        let here = sample.pose().position;
-        let way = match (self.belief.map(), &self.target) {
-            (Some(map), Some(sample)) => wavefront::way(&map, here, sample.target.position()),
-            _ => Way::Unknown,
-        };
-        self.along(way, sample)
+    /// Applies one `grid` sample. Returns false if a version is missing, until a keyframe.
+    pub fn follow(&mut self, header: &GridHeader, cells: &[u8]) -> bool {
+        let followed = self.grid.apply(&header.part, cells) != Applied::Missed;
+        if followed {
+            self.header = *header;
+        }
+        followed
     }
 
-    fn along(&self, way: Way, sample: &PoseSample) -> GuidanceSample {
-        let belief = &self.belief.header;
+    pub fn guidance(&self, sample: &PoseSample) -> GuidanceSample {
         let pose = sample.pose();
+        let way = match (Map::of(&self.grid), &self.target) {
+            (Some(map), Some(sample)) => {
+                wavefront::way(&map, pose.position, sample.target.position())
+            }
+            _ => Way::Unknown,
+        };
         let toward = |point: DVec2| (point - pose.position).normalize_or(pose.axis());
         let (status, direction, limit) = match way {
             Way::Unknown => (GuidanceStatus::Waiting, DVec2::ZERO, 0.0),
@@ -65,8 +73,8 @@ impl Baseline {
             speed_limit_m_s: limit,
             status: status.into(),
             maneuver: status.maneuver().into(),
-            grid_version: belief.part.version,
-            ..GuidanceSample::for_pose(sample, belief, &self.target.unwrap_or_default())
+            grid_version: self.header.part.version,
+            ..GuidanceSample::for_pose(sample, &self.header, &self.target.unwrap_or_default())
         }
     }
 }

@@ -73,7 +73,7 @@ impl Process for Shell {
     fn turn(&mut self) -> Result<Progress, StageError> {
         while let Some(grid) = self.inputs.grid.next_slice()? {
             let header = grid.header();
-            if !self.baseline.belief.follow(header, &grid) {
+            if !self.baseline.follow(header, &grid) {
                 tracing::warn!(version = header.part.version, "missed a grid version");
                 continue;
             }

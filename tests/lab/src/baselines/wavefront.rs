@@ -7,7 +7,7 @@ use common::grid::Cell;
 use glam::DVec2;
 use report::shortest_path::over_neighbours;
 
-use crate::baselines::{belief::Map, planner::Way};
+use crate::baselines::{map::Map, planner::Way};
 
 /// Maximum distance to the path point that the robot heads for.
 const AIM_M: f64 = 0.6;

@@ -1,9 +1,9 @@
 use std::path::Path;
 
 use super::*;
-use crate::baselines::{belief::Belief, planner::Baseline};
+use crate::baselines::planner::Baseline;
 use common::{
-    grid::{CellState, GridFrame, Part},
+    grid::{CellState, GridFrame, Part, Replica},
     mission::Mission,
     samples::{GridHeader, GuidanceSample, GuidanceStatus, PoseSample, TargetSample},
 };
@@ -33,7 +33,7 @@ fn planner(map: &str) -> Baseline {
         b'#' => CellState::Sensed as u8,
         _ => CellState::Free as u8,
     });
-    assert!(planner.belief.follow(&header, &cells.collect::<Vec<_>>()));
+    assert!(planner.follow(&header, &cells.collect::<Vec<_>>()));
     planner
 }
 
@@ -44,7 +44,7 @@ fn guidance(planner: &Baseline, [x_m, y_m]: [f64; 2]) -> GuidanceSample {
 #[test]
 fn without_a_map_the_robot_waits() {
     let mut planner = planner(WALL);
-    planner.belief = Belief::default();
+    planner.grid = Replica::default();
     let status = guidance(&planner, [0.0, 0.0]).status;
     assert_eq!(status, u8::from(GuidanceStatus::Waiting));
 }
@@ -59,7 +59,7 @@ fn the_way_leads_around_a_wall_and_cuts_no_corner() {
         assert_eq!(guidance.status, u8::from(GuidanceStatus::Along), "at {at}, after {driven} m");
         at += 0.02 * DVec2::new(guidance.ex, guidance.ey);
         driven += 0.02;
-        assert!(planner.belief.map().unwrap().free_cell_at(at).is_some(), "in the wall at {at}");
+        assert!(Map::of(&planner.grid).unwrap().free_cell_at(at).is_some(), "in the wall at {at}");
         assert!(driven < 2.0, "it does not end, at {at}");
     }
     // The path rounds the wall's end in two legs of 0.3 m by 0.3 m, 0.85 m in all; whole cells

@@ -1,17 +1,8 @@
-use common::{
-    grid::{Applied, Cell, CellState, GridFrame, Replica},
-    samples::GridHeader,
-};
+use common::grid::{Cell, CellState, GridFrame, Replica};
 use glam::DVec2;
 
 /// Step along a line of sight, in cells.
 const SIGHT_STEP: f64 = 0.1;
-
-#[derive(Clone, Default)]
-pub struct Belief {
-    grid: Replica<u8>,
-    pub header: GridHeader,
-}
 
 /// Complete map whose hazard cells include the body's margin.
 #[derive(Clone, Copy, Debug)]
@@ -20,24 +11,11 @@ pub struct Map<'a> {
     cells: &'a [u8],
 }
 
-impl Belief {
-    /// Applies one `grid` sample. Returns false if a version is missing; the map is then absent
-    /// until a keyframe.
-    pub fn follow(&mut self, header: &GridHeader, cells: &[u8]) -> bool {
-        let followed = self.grid.apply(&header.part, cells) != Applied::Missed;
-        if followed {
-            self.header = *header;
-        }
-        followed
+impl<'a> Map<'a> {
+    pub fn of(grid: &'a Replica<u8>) -> Option<Self> {
+        Some(Self { frame: grid.frame()?, cells: grid.cells() })
     }
 
-    pub fn map(&self) -> Option<Map<'_>> {
-        let frame = self.grid.frame()?;
-        Some(Map { frame, cells: self.grid.cells() })
-    }
-}
-
-impl Map<'_> {
     pub fn is_free(&self, cell: Cell) -> bool {
         let inside = cell.col < self.frame.cells && cell.row < self.frame.cells;
         let byte = self.cells.get(self.frame.index(cell)).filter(|_| inside);
