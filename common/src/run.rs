@@ -105,7 +105,7 @@ mod tests {
             robot: "x80".parse().unwrap(),
             address: Address::Ros2(Some(7)),
             clock: MissionClock::Ticks { period_ns: 1 },
-            mission: Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap(),
+            mission: Mission::parse("target = [3, 0]", "m.toml").unwrap(),
         };
         run.save(directory.path()).unwrap();
         assert_eq!(Run::load(directory.path()).unwrap(), run);

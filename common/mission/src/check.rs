@@ -48,7 +48,8 @@ const MAX_TIMEOUT_S: f64 = 86_400.0;
 impl Mission {
     /// # Errors
     /// Returns the line, the key, the fault and the remedy; `origin` names the file.
-    pub fn parse(text: &str, origin: &Path) -> Result<Self, MissionError> {
+    pub fn parse(text: &str, origin: impl AsRef<Path>) -> Result<Self, MissionError> {
+        let origin = origin.as_ref();
         let syntax = |error: &toml::de::Error| {
             let line = error.span().map_or(1, |span| line_of(text, span.start));
             unreadable(origin, line, &error.message().trim().replace('\n', " "))

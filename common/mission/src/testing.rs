@@ -1,7 +1,5 @@
 //! Missions and comparisons of tests.
 
-use std::path::Path;
-
 use crate::{Mission, MissionError};
 
 /// Parses `text` as m.toml, after a line with a target unless it has one or begins with a
@@ -10,7 +8,7 @@ pub(crate) fn parse(text: &str) -> Result<Mission, MissionError> {
     let is_whole =
         text.starts_with("description") || text.lines().any(|it| it.starts_with("target"));
     let line = if is_whole { "" } else { "target = [3, 0]\n" };
-    Mission::parse(&format!("{line}{text}"), Path::new("m.toml"))
+    Mission::parse(&format!("{line}{text}"), "m.toml")
 }
 
 #[track_caller]

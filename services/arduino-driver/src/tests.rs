@@ -1,5 +1,3 @@
-use std::path::Path;
-
 use common::samples::{RangeReading, RangeStatus};
 
 use super::*;
@@ -11,7 +9,7 @@ fn mission(set: &str) -> Mission {
         [[robot.sensor]]\nname = 'front'\nkind = 'cone'\nchannel = 1\nforward_m = 0.1\nbearing_deg = 0\n\
         [[robot.sensor]]\nname = 'left'\nkind = 'cone'\nchannel = 0\nforward_m = 0.1\nbearing_deg = 40\n"
     );
-    Mission::parse(&text, Path::new("m.toml")).unwrap()
+    Mission::parse(&text, "m.toml").unwrap()
 }
 
 fn driver() -> Arduino {

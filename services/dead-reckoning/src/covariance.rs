@@ -162,7 +162,6 @@ pub(crate) fn upper(covariance: SMatrix<f64, 3, 3>) -> [f64; 6] {
 mod tests {
     use super::*;
     use common::mission::Mission;
-    use std::path::Path;
 
     /// Deviations in thousandths.
     fn model(thousandths: [u8; 4]) -> ErrorModel {
@@ -170,7 +169,7 @@ mod tests {
         let text = format!(
             "target = [3, 0]\n[robot.odometry]\nslip = {slip}\ndiameter_ratio_sd = {ratio}\ntrack_scale_sd = {track}\ndistance_scale_sd = {distance}"
         );
-        let mission = Mission::parse(&text, Path::new("test.toml")).unwrap();
+        let mission = Mission::parse(&text, "test.toml").unwrap();
         ErrorModel::new(&mission.robot.odometry, &mission.body())
     }
 

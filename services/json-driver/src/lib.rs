@@ -251,7 +251,7 @@ impl Base for Json {
 
 #[cfg(test)]
 mod tests {
-    use std::{f64::consts::TAU, path::Path};
+    use std::f64::consts::TAU;
 
     use common::samples::RangeStatus;
 
@@ -259,7 +259,7 @@ mod tests {
 
     fn driver_of(text: &str) -> Json {
         let text = format!("target = [3, 0]\n{text}");
-        Json::new(&Mission::parse(&text, Path::new("m.toml")).unwrap())
+        Json::new(&Mission::parse(&text, "m.toml").unwrap())
     }
 
     pub(crate) fn driver() -> Json {

@@ -1,7 +1,5 @@
 //! Set-ups of the tests.
 
-use std::path::Path;
-
 use common::{
     clock::MissionTime,
     mission::Mission,
@@ -15,7 +13,7 @@ pub(crate) const PERIOD_S: f64 = 1.0 / 7.0;
 
 /// Returns a mission with a target and these lines.
 pub(crate) fn mission(text: &str) -> Mission {
-    Mission::parse(&format!("target = [3, 0]\n{text}"), Path::new("test.toml")).unwrap()
+    Mission::parse(&format!("target = [3, 0]\n{text}"), "test.toml").unwrap()
 }
 
 pub(crate) const ARDUINO: &str = "robot.protocol = 'arduino'\nrobot.counts_per_turn = 1200\nrobot.rate_hz = 10\nrobot.arduino.sonars = { front = 4 }\n[[robot.sensor]]\nname = 'front'\nkind = 'cone'\nchannel = 1\nforward_m = 0.1\nbearing_deg = 0\n";

@@ -1,12 +1,10 @@
 //! Set-ups of the tests.
 
-use std::path::Path;
-
 use common::mission::Mission;
 use glam::DVec2;
 
 pub(crate) fn mission(text: &str) -> Mission {
-    Mission::parse(text, Path::new("test.toml")).unwrap()
+    Mission::parse(text, "test.toml").unwrap()
 }
 
 /// Returns the range of a beam to the walls of a room around the origin.

@@ -1,7 +1,5 @@
 //! Set-ups of the tests.
 
-use std::path::Path;
-
 use common::{
     mission::Mission,
     samples::{ClearBeam, GridHeader},
@@ -9,7 +7,7 @@ use common::{
 use glam::DVec2;
 
 pub(crate) fn mission(text: &str) -> Mission {
-    Mission::parse(text, Path::new("test.toml")).unwrap()
+    Mission::parse(text, "test.toml").unwrap()
 }
 
 pub(crate) fn beam(from: DVec2, bearing_deg: f64, clear_m: f64) -> ClearBeam {

@@ -2,8 +2,6 @@
 
 mod imu;
 
-use std::path::Path;
-
 use common::samples::RangeStatus;
 
 use super::*;
@@ -62,7 +60,7 @@ fn scan_of(fan: [f64; 2], ranges: &[f32]) -> Vec<u8> {
 }
 
 fn mission(text: &str) -> Mission {
-    Mission::parse(text, Path::new("m.toml")).unwrap()
+    Mission::parse(text, "m.toml").unwrap()
 }
 
 fn is_refused(heard: &Heard, words: &str) -> bool {

@@ -1,5 +1,3 @@
-use std::path::Path;
-
 use common::mission::Mission;
 
 use super::*;
@@ -10,7 +8,7 @@ fn rplidar(set: &str) -> Rplidar {
     let text = format!(
         "target = [3, 0]\nrobot.counts_per_turn = 1320\nrobot.protocol = 'arduino'\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nmodel = 'rplidar-a1'\nforward_m = 0\nbearing_deg = 0\nbeams = 36\n{set}"
     );
-    let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+    let mission = Mission::parse(&text, "m.toml").unwrap();
     let (row, sensor, product) = mission.rplidars().remove(0);
     Rplidar::new(row, sensor, product)
 }

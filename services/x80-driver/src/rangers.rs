@@ -70,11 +70,10 @@ fn seen(ad: u16) -> RangeReading {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
 
     fn rangers(extra: &str) -> Rangers {
         let text = format!("target = [3, 0]\n{extra}");
-        Rangers::new(&Mission::parse(&text, Path::new("test.toml")).unwrap())
+        Rangers::new(&Mission::parse(&text, "test.toml").unwrap())
     }
 
     fn is(reading: &RangeReading, status: RangeStatus, range_m: f64, raw: u16) -> bool {

@@ -9,11 +9,10 @@
 //! Only [`shell`] and its transports use sockets and clocks:
 //!
 //! ```
-//! use std::path::Path;
 //! use common::{mission::Mission, wire::{Addressing, Command, Decoder}};
 //! use x80_sim::robot::{Heard, Robot};
 //!
-//! let mission = Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap();
+//! let mission = Mission::parse("target = [3, 0]", "m.toml").unwrap();
 //! let mut robot = Robot::new(&mission);
 //! let mut bytes = Vec::new();
 //! // Forward is negative on channel 0.

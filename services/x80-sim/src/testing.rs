@@ -1,12 +1,10 @@
 //! Set-ups of the tests.
 
-use std::path::Path;
-
 use common::mission::{Mission, Realism};
 
 /// Returns a mission with a target aside and these lines.
 pub(crate) fn mission(text: &str) -> Mission {
-    Mission::parse(&format!("target = [0, -5]\n{text}"), Path::new("test.toml")).unwrap()
+    Mission::parse(&format!("target = [0, -5]\n{text}"), "test.toml").unwrap()
 }
 
 /// Returns a mission with ideal sensors and wheels, unless `text` names a realism.

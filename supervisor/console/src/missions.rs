@@ -60,20 +60,19 @@ fn complete(mission: Mission) -> Result<Mission, LookupError> {
         // Start and targets may lie inside the map's obstacles.
         let failed = |problem| LookupError::OnMap { name: mission.name.clone(), problem };
         let text = toml::to_string(&mission).map_err(|error| failed(error.to_string()))?;
-        Mission::parse(&text, Path::new(&mission.name))
-            .map_err(|error| failed(error.without_place()))?;
+        Mission::parse(&text, &mission.name).map_err(|error| failed(error.without_place()))?;
     }
     Ok(mission)
 }
 
 pub fn parsed(text: &str, origin: &str, assignments: &[String]) -> Result<Mission, LookupError> {
-    let as_written = Mission::parse(text, Path::new(origin));
+    let as_written = Mission::parse(text, origin);
     // Validation follows all assignments, which may depend on each other.
     let table = text.parse::<toml::Table>();
     let (false, Ok(table)) = (assignments.is_empty(), table) else {
         return complete(as_written?);
     };
-    let mission = Mission::parse(&assign(table, assignments)?, Path::new(origin));
+    let mission = Mission::parse(&assign(table, assignments)?, origin);
     complete(mission.map_err(|error| match as_written {
         // The file's own error names the line.
         Err(of_file) if of_file.is_same_fault(&error) => of_file.into(),
@@ -135,11 +134,11 @@ mod tests {
     fn the_mission_in_the_guide_is_valid_and_shows_the_defaults() {
         let guide = include_str!("../../guide/mission-file.md");
         let text = guide.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
-        let mut shown = Mission::parse(text, Path::new("mission-file.md")).unwrap();
+        let mut shown = Mission::parse(text, "mission-file.md").unwrap();
         shown.known = common::geometry::Shapes::default();
         shown.zones = Vec::new();
         shown.world = common::geometry::Shapes::default();
-        let plain = Mission::parse("target = [4.0, 0.0]", Path::new("mission-file.md")).unwrap();
+        let plain = Mission::parse("target = [4.0, 0.0]", "mission-file.md").unwrap();
         assert_eq!(shown, plain);
     }
 

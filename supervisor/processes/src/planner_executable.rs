@@ -62,7 +62,7 @@ mod tests {
 
     fn resolved(named: &Path) -> Result<PathBuf, String> {
         let text = format!("target = [1, 0]\nplanner.executable = {named:?}");
-        let mut mission = Mission::parse(&text, Path::new("test.toml")).unwrap();
+        let mut mission = Mission::parse(&text, "test.toml").unwrap();
         resolve(&mut mission, &["odometry", "wavefront"]).map_err(|error| error.to_string())?;
         Ok(mission.planner.executable.unwrap())
     }

@@ -68,7 +68,7 @@ impl Target {
 
     fn wire(name: &'static str, robot: &str, seed: impl Into<Vec<u8>>) -> Result<Self> {
         let text = format!("target = [3, 0]\n{robot}");
-        let mission = Mission::parse(&text, Path::new(name)).or_cannot("fuzz")?;
+        let mission = Mission::parse(&text, name).or_cannot("fuzz")?;
         let mut link = Link::new(&mission);
         link.restore(State { pace: Pace::Rate(1.0), next_tick: 0 });
         Ok(Self { link: Some(link), ..Self::file(name, seed) })

@@ -291,7 +291,6 @@ fn hazards(touched: &BTreeMap<String, bool>, now_ns: u64) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
 
     use common::driver::{Base as _, Driver as _};
     use ros2_driver::Ros2;
@@ -300,7 +299,7 @@ mod tests {
 
     fn mission() -> Mission {
         let text = "target = [3, 0]\nrobot.model = 'kobuki'\nrobot.rate_hz = 10\nrobot.protocol = 'ros2'\nrobot.address = 'ros2:7'\nrobot.ros2.hazards = '/hazards'\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nfield_of_view_deg = 180\nbeams = 3\nreach_m = 4.0";
-        Mission::parse(text, Path::new("m.toml")).unwrap()
+        Mission::parse(text, "m.toml").unwrap()
     }
 
     #[test]

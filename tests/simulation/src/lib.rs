@@ -271,7 +271,7 @@ impl Ran {
 
 #[cfg(test)]
 mod tests {
-    use std::{any::Any, path::Path, time::UNIX_EPOCH};
+    use std::{any::Any, time::UNIX_EPOCH};
 
     use common::topics;
 
@@ -280,7 +280,7 @@ mod tests {
     fn mission() -> Mission {
         let text =
             "target = [3, 0]\ntimeout_s = 120\nworld.drum = [{at = [1.5, 0.1], radius_m = 0.2}]";
-        Mission::parse(text, Path::new("simulation.toml")).unwrap()
+        Mission::parse(text, "simulation.toml").unwrap()
     }
 
     #[derive(Default)]

@@ -185,7 +185,6 @@ impl RobotFault {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
 
     use super::*;
 
@@ -193,7 +192,7 @@ mod tests {
     fn every_fault_from_which_the_robot_must_rest_has_a_time_which_grows_with_a_slower_base() {
         let mission = |text: &str| {
             let text = format!("target = [3, 0]\n{text}");
-            Mission::parse(&text, Path::new("m.toml")).unwrap()
+            Mission::parse(&text, "m.toml").unwrap()
         };
         let light = mission("");
         let heavy = mission("robot.response = { delay_s = 0.3, acceleration_m_s2 = 0.6 }");

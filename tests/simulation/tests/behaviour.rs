@@ -5,7 +5,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::{path::Path, thread};
+use std::thread;
 
 use common::mission::Mission;
 use crc32fast::Hasher;
@@ -47,7 +47,7 @@ fn row((robot, keys): (&str, &str), seed: u64) -> Row {
         "target = [3, 0]\ntimeout_s = 60\nworld.drum = [{{ at = [1.5, 0.1], radius_m = 0.2 }}]\n\
          {keys}"
     );
-    let mission = Mission::parse(&text, Path::new("behaviour.toml")).unwrap();
+    let mission = Mission::parse(&text, "behaviour.toml").unwrap();
     let Ran { summary, broken, events, truth, causes, .. } = Scenario::draw(&mission, seed).run();
     assert!(broken.is_none(), "{robot}, seed {seed}: {broken:?}");
     let mut summary = summary.unwrap();

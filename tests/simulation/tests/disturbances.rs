@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::{cell::RefCell, path::Path, rc::Rc, time::Duration};
+use std::{cell::RefCell, rc::Rc, time::Duration};
 
 use common::{
     bus::{Bus, Reader},
@@ -52,7 +52,7 @@ fn ran_before(
     disturbances: &[Disturbance],
     while_waiting: &[Request],
 ) -> Ran {
-    let mission = Mission::parse(text, Path::new("disturbed.toml")).unwrap();
+    let mission = Mission::parse(text, "disturbed.toml").unwrap();
     let (disturbances, while_waiting) = (disturbances.to_vec(), while_waiting.to_vec());
     let scenario = Scenario { disturbances, while_waiting, ..Scenario::calm(&mission) };
     let ran = scenario.run_before(observer);

@@ -2,8 +2,6 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::path::Path;
-
 use common::mission::Mission;
 use console::missions;
 use mission_control::{
@@ -55,7 +53,7 @@ fn arrives_untouched(mission: &str, settings: &[&str]) -> Summary {
 #[track_caller]
 fn text_ends(text: &str, outcome: Outcome) -> Summary {
     let text = format!("sure_within_m = 9\nseed = 3\n{text}");
-    let summary = summary_of(&Mission::parse(&text, Path::new("text.toml")).unwrap());
+    let summary = summary_of(&Mission::parse(&text, "text.toml").unwrap());
     assert_eq!((summary.outcome, summary.collisions), (outcome, Some(0)), "{text}: {summary:?}");
     summary
 }

@@ -3,7 +3,7 @@ use crate::testing::{assert_refused, close, mission, parse, read_back};
 
 #[test]
 fn a_target_is_all_a_mission_needs() {
-    let mission = Mission::parse("target = [3, 0.5]", Path::new("dir/short.toml")).unwrap();
+    let mission = Mission::parse("target = [3, 0.5]", "dir/short.toml").unwrap();
     assert_eq!(mission.name, "short");
     assert_eq!(mission.grid_frame().resolution_m, 0.05);
     assert_eq!(mission.body().counts_per_turn, 1200.0);

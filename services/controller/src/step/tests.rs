@@ -5,13 +5,10 @@ use common::{
     kinematics::Pose2,
     samples::{BaseResponseSample, Maneuver, TargetPoint},
 };
-use std::{
-    f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, FRAC_PI_3, FRAC_PI_4, PI},
-    path::Path,
-};
+use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, FRAC_PI_3, FRAC_PI_4, PI};
 
 fn mission(text: &str) -> Mission {
-    Mission::parse(&format!("target = [3, 0]\n{text}"), Path::new("test.toml")).unwrap()
+    Mission::parse(&format!("target = [3, 0]\n{text}"), "test.toml").unwrap()
 }
 
 /// Returns a controller with vd = 0.4, wd = 0.8, Rc = 0.5, target (3, 0), r = 0.1, W = 0.4.

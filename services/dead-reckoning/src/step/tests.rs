@@ -1,7 +1,7 @@
 use super::*;
 use common::samples::{Stamp, TurnSample};
 use glam::DVec4;
-use std::{f64::consts::PI, path::Path};
+use std::f64::consts::PI;
 
 fn reckoning(extra: &str) -> DeadReckoning {
     // r = 0.1 m, W = 0.4 m, 1000 counts per turn: a count is 0.2 pi mm of rim.
@@ -12,7 +12,7 @@ fn reckoning(extra: &str) -> DeadReckoning {
 }
 
 pub(super) fn reckoning_of(mission: &str) -> DeadReckoning {
-    DeadReckoning::new(&Mission::parse(mission, Path::new("test.toml")).unwrap())
+    DeadReckoning::new(&Mission::parse(mission, "test.toml").unwrap())
 }
 
 fn wheels(tick: u64, left: u16, right: u16) -> WheelSample {

@@ -4,7 +4,7 @@ use std::{
     io::{BufRead, BufReader},
     net::{SocketAddr, UdpSocket},
     os::unix::net::UnixStream,
-    path::{Path, PathBuf},
+    path::PathBuf,
     sync::mpsc::{Receiver, channel},
     thread::JoinHandle,
     time::Duration,
@@ -23,8 +23,7 @@ pub(crate) const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Returns a mission with ideal sensors and wheels, unless `text` names a realism.
 pub(crate) fn mission(text: &str) -> Mission {
-    let mut mission =
-        Mission::parse(&format!("target = [3, 0]\n{text}"), Path::new("test.toml")).unwrap();
+    let mut mission = Mission::parse(&format!("target = [3, 0]\n{text}"), "test.toml").unwrap();
     if !text.contains("realism") {
         mission.simulation.realism = Realism::Laboratory;
     }

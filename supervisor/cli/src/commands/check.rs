@@ -124,12 +124,11 @@ fn wrong_places(mission: &Mission) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
 
     use super::*;
 
     fn mission(text: &str) -> Mission {
-        Mission::parse(text, Path::new("m.toml")).unwrap()
+        Mission::parse(text, "m.toml").unwrap()
     }
 
     #[test]

@@ -164,7 +164,7 @@ mod tests {
     #[test]
     fn the_packaged_mission_is_valid() {
         let text = unit("mission.toml");
-        common::mission::Mission::parse(text, Path::new("mission.toml")).unwrap();
+        common::mission::Mission::parse(text, "mission.toml").unwrap();
     }
 
     #[test]

@@ -97,7 +97,7 @@ mod tests {
 
     fn mission(text: &str) -> Mission {
         let text = format!("target = [2, 0]\nperimeter.width_m = 6\n{text}");
-        Mission::parse(&text, Path::new("m.toml")).unwrap()
+        Mission::parse(&text, "m.toml").unwrap()
     }
 
     fn hazards(mission: &Mission) -> Vec<bool> {

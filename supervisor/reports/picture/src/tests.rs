@@ -1,7 +1,5 @@
 //! Tests of the picture, on an ordinary run and on unusual scenes.
 
-use std::path::Path;
-
 use common::{grid::CellState, kinematics::Pose2, mission::Mission, samples::FieldCell};
 use glam::DVec2;
 
@@ -74,7 +72,7 @@ fn mission(cells: u32) -> Mission {
         [[world.wall]]
         points = [[-1.2, 2.6], [0.6, 2.6], [0.6, 1.7]]"
     );
-    Mission::parse(&text, Path::new("three-drums.toml")).unwrap()
+    Mission::parse(&text, "three-drums.toml").unwrap()
 }
 
 fn three_drums() -> Run {
@@ -227,7 +225,7 @@ fn what_is_low_is_dashed_what_is_of_glass_dash_dotted_what_is_soft_dotted_and_th
         let mut run = three_drums();
         let text =
             format!("target = [3, 0]\nworld.drum = [{{ at = [1, 1], radius_m = 0.3{profile} }}]");
-        run.mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+        run.mission = Mission::parse(&text, "m.toml").unwrap();
         let picture = svg(&Scene { grid: None, field: None, ..run.scene() });
         assert_well_formed(&picture);
         ["drum, box, wall", "low or overhanging", ">glass<", "absorbs sound"]

@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn of_a_long_run_a_bounded_number_of_maps_is_held_and_they_are_spread_over_it() {
-        let mission = Mission::parse("target = [4.0, 0.0]", "test.toml".as_ref()).unwrap();
+        let mission = Mission::parse("target = [4.0, 0.0]", "test.toml").unwrap();
         let frame = mission.grid_frame();
         let header = GridHeader { part: Part::whole(frame, 1), ..GridHeader::default() };
         let cells = vec![0; frame.area()];

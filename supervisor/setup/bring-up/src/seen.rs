@@ -3,7 +3,7 @@
 //! The robot is only asked for reports: no order releases its brake or moves it. Its answers may be
 //! hostile, so stored data are limited, and the mission is validated like any other.
 
-use std::{collections::BTreeSet, path::Path};
+use std::collections::BTreeSet;
 
 use common::{
     driver::Base,
@@ -39,7 +39,7 @@ impl Seen {
     /// # Errors
     /// None: the mission that it begins with is valid.
     pub fn new(protocol: Protocol) -> Result<Self, MissionError> {
-        let mut mission = Mission::parse("target = [2, 0]\nrobot.rate_hz = 10", Path::new(""))?;
+        let mut mission = Mission::parse("target = [2, 0]\nrobot.rate_hz = 10", "")?;
         mission.robot.protocol = Some(protocol);
         let driver = drivers::base(&mission).0;
         let (lines, report, words, ticks, refused) = Default::default();

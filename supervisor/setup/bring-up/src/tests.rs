@@ -1,7 +1,6 @@
 use std::{
     f64::consts::{FRAC_PI_2, TAU},
     fmt::Debug,
-    path::Path,
     str::FromStr,
 };
 
@@ -50,7 +49,7 @@ fn through(wires: Wires, values: [f64; 2]) -> [f64; 2] {
 }
 
 fn parsed(text: &str) -> Mission {
-    Mission::parse(text, Path::new("m.toml")).unwrap()
+    Mission::parse(text, "m.toml").unwrap()
 }
 
 fn mission() -> Mission {

@@ -234,7 +234,6 @@ pub fn keys(estimate: &Estimate, stated: Response) -> String {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
 
     use common::mission::{Mission, ModelledSpeed};
 
@@ -257,7 +256,7 @@ mod tests {
 
     fn body() -> Body {
         let text = "target = [3, 0]\nrobot.response.lag_s = 0.0";
-        Mission::parse(text, Path::new("m.toml")).unwrap().body()
+        Mission::parse(text, "m.toml").unwrap().body()
     }
 
     #[test]

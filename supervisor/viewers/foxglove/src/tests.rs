@@ -6,7 +6,6 @@ use std::{
     f64::consts::FRAC_PI_2,
     io::{Read as _, Write as _},
     net::TcpStream,
-    path::Path,
     time::Duration,
 };
 
@@ -32,7 +31,7 @@ type Sent = BTreeMap<String, Vec<u8>>;
 
 fn mission(robot: &str) -> Mission {
     let text = format!("target = [4, 0]\nrobot.model = '{robot}'");
-    Mission::parse(&text, Path::new("m.toml")).unwrap()
+    Mission::parse(&text, "m.toml").unwrap()
 }
 
 /// Returns the messages for a robot at (1, 2) that senses an obstacle at 0.5 m.

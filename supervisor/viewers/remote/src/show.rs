@@ -185,7 +185,7 @@ fn payload(reply: &Reply) -> Option<Vec<u8>> {
 /// The mission sets the mirror's memory.
 pub fn checked(text: &str) -> Option<Run> {
     let run: Run = toml::from_str(text).ok()?;
-    Mission::parse(&toml::to_string(&run.mission).ok()?, Path::new("the run file")).ok()?;
+    Mission::parse(&toml::to_string(&run.mission).ok()?, "the run file").ok()?;
     Some(run)
 }
 

@@ -1,4 +1,4 @@
-use std::{cell::RefCell, path::Path};
+use std::cell::RefCell;
 
 use common::{
     address::Address,
@@ -28,7 +28,7 @@ fn run() -> Run {
         robot: "x80".parse().unwrap(),
         address: Address::Udp("127.0.0.1:9".parse().unwrap()),
         clock: MissionClock::Ticks { period_ns: 1 },
-        mission: Mission::parse("target = [3.0, 0.0]", Path::new("test")).unwrap(),
+        mission: Mission::parse("target = [3.0, 0.0]", "test").unwrap(),
     }
 }
 

@@ -35,7 +35,6 @@ fn read(mission: &Mission) -> impl Iterator<Item = String> {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
 
     use super::*;
     use common::clock::MissionClock;
@@ -44,7 +43,7 @@ mod tests {
         let text = format!(
             "target = [3, 0]\nrobot.model = 'turtlebot3-burger'\nrobot.protocol = 'ros2'\nrobot.address = 'ros2:7'\n{keys}"
         );
-        let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+        let mission = Mission::parse(&text, "m.toml").unwrap();
         let sensors = [(Id::Scan(0), ""), (Id::Range(1), "nose-1")];
         let run = Run {
             robot: "x80".parse().unwrap(),

@@ -1,9 +1,6 @@
 //! Messages below were serialised by rclpy of ROS 2 Kilted with Fast DDS, with zeros as padding.
 
-use std::{
-    f64::consts::{FRAC_PI_2, PI},
-    path::Path,
-};
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use common::{
     grid::{Cell, CellState, GridFrame, Part},
@@ -42,7 +39,7 @@ const AT_NS: u64 = 12_500_000_000;
 const FRAME: GridFrame = GridFrame { cells: 10, resolution_m: 0.1, centre: DVec2::ZERO };
 
 fn mission(text: &str) -> Mission {
-    Mission::parse(text, Path::new("m.toml")).unwrap()
+    Mission::parse(text, "m.toml").unwrap()
 }
 
 #[test]

@@ -213,10 +213,10 @@ mod tests {
     use super::*;
     use crate::missions::{results::Table, trial::Rules};
     use common::mission::Mission;
-    use std::{fs, path::Path};
+    use std::fs;
 
     fn judged(rules: Rules, summary: &Summary) -> Row {
-        let mission = Mission::parse("target = [4, 0]", Path::new("test.toml")).unwrap();
+        let mission = Mission::parse("target = [4, 0]", "test.toml").unwrap();
         let trial = Trial { mission, shortest_m: 4.0, rules, oncoming: None };
         let (name, planner) = ("a".to_owned(), "harmonic".to_owned());
         Row::new(&trial, 1, &Setting { name, planner, set: Vec::new() }, summary)

@@ -6,7 +6,7 @@ use common::{
 };
 use glam::DVec2;
 use mission_control::outcome::RIGHT_PLACE_M;
-use std::{iter, path::Path};
+use std::iter;
 
 use crate::error::Result;
 use report::shortest_path::shortest_path;
@@ -125,7 +125,7 @@ fn mission(world: &str, scene: Scene) -> Result<Mission> {
         "target = [{:?}, {:?}]\nperimeter = {{ width_m = {width_m:?}, centre = [{:?}, {:?}] }}",
         target.x, target.y, centre.x, centre.y,
     );
-    let mut mission = Mission::parse(&text, Path::new(world))?;
+    let mut mission = Mission::parse(&text, world)?;
     mission.name = world.to_owned();
     mission.start.heading_deg = heading.to_degrees();
     mission.world = shapes;

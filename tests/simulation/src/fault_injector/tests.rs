@@ -1,5 +1,3 @@
-use std::path::Path;
-
 use clap::ValueEnum as _;
 use common::{
     json_wire::{Order, line, parse},
@@ -63,7 +61,7 @@ fn sonar(passed: &[Late]) -> Option<u8> {
 fn injector(protocol: Protocol, seed: u64) -> FaultInjector {
     let protocol = if protocol == Protocol::X80 { "x80" } else { "json" };
     let text = format!("target = [3, 0]\nrobot.protocol = '{protocol}'");
-    FaultInjector::new(&Mission::parse(&text, Path::new("m.toml")).unwrap(), seed)
+    FaultInjector::new(&Mission::parse(&text, "m.toml").unwrap(), seed)
 }
 
 /// Returns an injector whose robot said `before` at 1 s, unchanged, and then became faulty.

@@ -22,7 +22,7 @@ fn mission_of(seen: &Seen) -> Mission {
 }
 
 fn parsed(text: &str) -> Result<Mission, String> {
-    Mission::parse(text, Path::new("m.toml")).map_err(|error| format!("{error}\n{text}"))
+    Mission::parse(text, "m.toml").map_err(|error| format!("{error}\n{text}"))
 }
 
 #[test]

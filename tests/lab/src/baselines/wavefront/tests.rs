@@ -1,5 +1,3 @@
-use std::path::Path;
-
 use super::*;
 use crate::baselines::planner::Baseline;
 use common::{
@@ -23,7 +21,7 @@ const WALL: &str = "\
 /// Returns a planner to (0.3, 0.0) that knows a drawn map: `#` is hazard, the first row has the
 /// greatest y. Cells are 0.1 m wide, the middle one at (0, 0).
 fn planner(map: &str) -> Baseline {
-    let mission = Mission::parse("target = [0.3, 0.0]", Path::new("test.toml")).unwrap();
+    let mission = Mission::parse("target = [0.3, 0.0]", "test.toml").unwrap();
     let mut planner = Baseline::new(&mission);
     planner.target = Some(TargetSample::first(&mission));
     let frame = GridFrame { cells: 9, resolution_m: 0.1, centre: DVec2::ZERO };
