@@ -146,12 +146,12 @@ pub fn main(arguments: &Arguments) -> Result {
     let mut failed = 0;
     in_parallel((0..count).collect(), arguments.jobs, drive, |(number, driven)| {
         match driven {
-            Ok((robot, Healthy { residuals, hours, greatest, causes })) => {
-                for (cause, doubt) in &causes {
+            Ok((robot, healthy)) => {
+                for (cause, doubt) in &healthy.causes {
                     say(format_args!("mission {number}, {robot}: {} ({doubt})", cause.name()));
                 }
-                doubts.add(hours, &greatest, causes);
-                for Residual { source, tick, value } in residuals {
+                doubts.add(&healthy);
+                for Residual { source, tick, value } in healthy.residuals {
                     rows.serialize((number, robot, source, tick, format!("{value:.6}")))?;
                     all.entry((robot, source)).or_default().push(value);
                 }
@@ -205,18 +205,13 @@ struct Doubts {
 }
 
 impl Doubts {
-    fn add(
-        &mut self,
-        hours: f64,
-        greatest: &BTreeMap<&'static str, f64>,
-        causes: Vec<(Cause, &'static str)>,
-    ) {
-        self.missions += usize::from(hours > 0.0);
-        self.hours += hours;
-        for (doubt, evidence) in greatest {
+    fn add(&mut self, mission: &Healthy) {
+        self.missions += usize::from(mission.hours > 0.0);
+        self.hours += mission.hours;
+        for (doubt, evidence) in &mission.greatest {
             self.greatest.entry(doubt).or_default().push(*evidence);
         }
-        for (cause, _) in causes {
+        for (cause, _) in &mission.causes {
             *self.causes.entry(cause.name()).or_default() += 1;
         }
     }
@@ -299,31 +294,24 @@ fn healthy(scenario: &Scenario) -> Result<Healthy> {
         return Err(broken.to_string().into());
     }
     let mut watch = watch.ok_or("the simulation still watches a run that has ended")?;
-    watch.failed.take().map_or(Ok(()), Err).or_cannot("read the bus of a simulation")?;
     watch.judge_poses(&ran.truth);
-    let mut driven = Healthy { residuals: watch.found, ..Healthy::default() };
+    watch.failed.or_cannot("read the bus of a simulation")?;
+    let hours = ran.simulated.as_secs_f64() / 3600.0;
     // A robot that was touched may rightly be doubted.
-    if ran.truth.last().is_some_and(|truth| truth.contacts == 0) {
-        driven.hours = ran.simulated.as_secs_f64() / 3600.0;
-        (driven.greatest, driven.causes) = (watch.greatest, watch.causes);
-    }
-    Ok(driven)
+    Ok(match ran.truth.last() {
+        Some(truth) if truth.contacts == 0 => Healthy { hours, ..watch.shown },
+        _ => Healthy { residuals: watch.shown.residuals, ..Healthy::default() },
+    })
 }
 
 impl Observer for Watch {
     fn on_bus(&mut self, bus: &Bus) {
-        match Inputs::open_readers(bus) {
-            Ok(readers) => self.readers = Some(readers),
-            Err(error) => self.failed = Some(error),
-        }
+        self.failed = Inputs::open_readers(bus).map(|readers| self.readers = Some(readers));
     }
 
     fn observe(&mut self) {
         if let Some(mut readers) = self.readers.take() {
-            if let Err(error) = self.take(&mut readers) {
-                self.failed = Some(error);
-            }
-            self.readers = Some(readers);
+            self.failed = self.take(&mut readers).map(|()| self.readers = Some(readers));
         }
     }
 }
@@ -342,16 +330,14 @@ readers! {
     }
 }
 
-/// Residuals of a run.
+/// Watch of a run, which ends with the first error.
 struct Watch {
     readers: Option<Inputs>,
-    failed: Option<BusError>,
-    found: Vec<Residual>,
-    greatest: BTreeMap<&'static str, f64>,
+    failed: Result<(), BusError>,
+    shown: Healthy,
     cause: Cause,
     /// Greatest doubt now.
     doubt: &'static str,
-    causes: Vec<(Cause, &'static str)>,
     sensors: Vec<Sensor>,
     body: Body,
     tick_s: f64,
@@ -371,12 +357,10 @@ impl Watch {
         let axis = |most| ModelledSpeed::new(response.dead_time_s(), most);
         Self {
             readers: None,
-            failed: None,
-            found: Vec::new(),
-            greatest: BTreeMap::new(),
+            failed: Ok(()),
+            shown: Healthy::default(),
             cause: Cause::None,
             doubt: "",
-            causes: Vec::new(),
             sensors: mission.sensor_table(),
             body,
             tick_s: 1.0 / mission.robot.rate_hz,
@@ -389,7 +373,7 @@ impl Watch {
 
     fn find(&mut self, source: Source, tick: u64, value: f64) {
         if value.is_finite() {
-            self.found.push(Residual { source, tick, value });
+            self.shown.residuals.push(Residual { source, tick, value });
         }
     }
 
@@ -418,7 +402,7 @@ impl Watch {
         while let Some(doubts) = readers.doubts.next_sample()? {
             let doubts = doubts.each();
             for (doubt, _, evidence) in &doubts {
-                let greatest = self.greatest.entry(doubt).or_default();
+                let greatest = self.shown.greatest.entry(doubt).or_default();
                 *greatest = greatest.max(*evidence);
             }
             let greatest = doubts.iter().max_by(|(.., one), (.., other)| one.total_cmp(other));
@@ -427,7 +411,7 @@ impl Watch {
         while let Some(link) = readers.link.next_sample()? {
             let cause = link.cause();
             if std::mem::replace(&mut self.cause, cause) != cause && FAULTS.contains(&cause) {
-                self.causes.push((cause, self.doubt));
+                self.shown.causes.push((cause, self.doubt));
             }
         }
         while let Some(slice) = readers.ranges.next_slice()? {
@@ -488,7 +472,7 @@ impl Watch {
             let Some(at) = rest.iter().position(|truth| truth.is_of(&pose)) else { continue };
             rest = &rest[at..];
             if rest[0].contacts > 0 {
-                self.found.retain(|residual| residual.tick < pose.stamp.tick);
+                self.shown.residuals.retain(|residual| residual.tick < pose.stamp.tick);
                 break;
             }
             let off = DVec2::new(pose.x_m - rest[0].x, pose.y_m - rest[0].y);
