@@ -29,7 +29,6 @@ use console::{
     output::{print_line, say},
 };
 use glam::{DMat2, DVec2};
-use serde::Serialize;
 use simulation::{Load, Observer, Random, Scenario};
 
 use crate::{
@@ -74,8 +73,8 @@ const SAME_SURFACE_M: f64 = 0.3;
 /// Drive healthy missions of drawn robots in one process, and measure how far what each source
 /// says is from what the others predict.
 ///
-/// Writes `corpus.csv`, a row per robot and residual, and `residuals.csv`, a row per residual. Writes
-/// `doubts.csv` with how often each doubt would stop a healthy robot.
+/// Writes `corpus.csv`, a row per robot and residual, and `doubts.csv`, how often each doubt would
+/// stop a healthy robot.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Number of missions.
@@ -95,7 +94,7 @@ pub struct Arguments {
     jobs: Option<NonZero<usize>>,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Source {
     Way,
     Turn,
@@ -137,8 +136,6 @@ pub fn main(arguments: &Arguments) -> Result {
         simulate::record(&scenario, &file)?;
         return print_line(format!("{robot}, {}; see {}", scenario.mission.name, file.display()));
     }
-    let mut rows = csv::Writer::from_path(directory.join("residuals.csv"))?;
-    rows.write_record(["mission", "robot", "residual", "tick", "value"])?;
     let mut all: BTreeMap<(&str, Source), Vec<f64>> = BTreeMap::new();
     let mut doubts = Doubts::default();
     let drive =
@@ -151,8 +148,7 @@ pub fn main(arguments: &Arguments) -> Result {
                     say(format_args!("mission {number}, {robot}: {} ({doubt})", cause.name()));
                 }
                 doubts.add(&healthy);
-                for Residual { source, tick, value } in healthy.residuals {
-                    rows.serialize((number, robot, source, tick, format!("{value:.6}")))?;
+                for Residual { source, value, .. } in healthy.residuals {
                     all.entry((robot, source)).or_default().push(value);
                 }
             }
@@ -163,7 +159,6 @@ pub fn main(arguments: &Arguments) -> Result {
         }
         Ok(())
     })?;
-    rows.flush()?;
     summarize(all, &directory.join("corpus.csv"))?;
     doubts.write(&directory.join("doubts.csv"))?;
     print_line(format!("{count} missions from seed {seed}; see {}", directory.display()))?;
