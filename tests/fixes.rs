@@ -34,7 +34,7 @@ fn by_fixes_and_a_gyro_unequal_wheels_arrive_though_dead_reckoning_is_killed_bet
     assert!(summary["pose_error_m"].as_f64() < Some(0.2), "{summary}");
     assert_eq!(summary["restarts"]["dead-reckoning"], 2, "{summary}");
     let recording = recording_in(&directory);
-    let last = recording.samples(&topics::POSE).unwrap().last().unwrap().unwrap().sample;
+    let last = recording.samples(&topics::POSE).unwrap().last().unwrap().unwrap();
     assert!(last.fixes > 10 && last.relocations == 0, "{last:?}");
     let report = replayed(&recording);
     assert!(report.stages["dead-reckoning"].compared > 50, "{report}");

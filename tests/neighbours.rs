@@ -106,7 +106,7 @@ fn a_second_controller_or_supervisor_and_samples_that_seem_newer_are_ignored_and
         let (summary, directory) = run.arrives_in();
         let recording = Recording::open(&directory.path().join("run")).unwrap();
         let poses = recording.samples(&topics::POSE).unwrap();
-        let stamps: Vec<_> = poses.map(|pose| pose.unwrap().sample.stamp).collect();
+        let stamps: Vec<_> = poses.map(|pose| pose.unwrap().stamp).collect();
         assert!(stamps.iter().all(|stamp| stamp.generation == 1));
         assert!(stamps.is_sorted_by_key(|stamp| stamp.tick));
         assert!(stamps.len() > 40, "{}", stamps.len());

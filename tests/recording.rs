@@ -11,13 +11,14 @@ use std::{
 };
 
 use common::{
+    bus::decode_sample,
     grid::CellState,
     poll,
-    samples::{RequestAnswer, RequestKind, name_str},
+    samples::{PoseSample, RequestAnswer, RequestKind, name_str},
     topics,
 };
 use recording::{
-    End, Recording,
+    End, Message, Recording,
     replay::{Options, replay},
 };
 use rustix::process::Signal;
@@ -71,18 +72,18 @@ fn a_run_is_recorded_from_its_first_sample_and_every_stage_replays_to_the_bit() 
     assert_eq!(recording.end, End::Complete);
     assert!(recording.lost.is_empty(), "{:?}", recording.lost);
     let poses = recording.samples(&topics::POSE).unwrap();
-    let ticks: Vec<u64> = poses.map(|pose| pose.unwrap().sample.stamp.tick).collect();
+    let ticks: Vec<u64> = poses.map(|pose| pose.unwrap().stamp.tick).collect();
     let expected: Vec<u64> = (0..ticks.len() as u64).collect();
     assert_eq!(ticks, expected);
     let mut grids = recording.slices(&topics::GRID).unwrap();
-    let first = grids.next().unwrap().unwrap();
-    assert!(first.header.part.is_keyframe());
-    assert_eq!(first.elements.len(), recording.run.mission.grid_frame().area());
+    let (header, cells) = grids.next().unwrap().unwrap();
+    assert!(header.part.is_keyframe());
+    assert_eq!(cells.len(), recording.run.mission.grid_frame().area());
     assert!(recording.counts["log"] > 5);
     assert!(recording.counts["wire"] > 2 * ticks.len() as u64);
     // On a wall clock a tick is answered again when its map is solved.
     let guidance = recording.samples(&topics::GUIDANCE).unwrap();
-    let guidance: Vec<_> = guidance.map(|guidance| guidance.unwrap().sample).collect();
+    let guidance: Vec<_> = guidance.map(Result::unwrap).collect();
     let again = guidance.windows(2).any(|pair| {
         pair[0].stamp.tick == pair[1].stamp.tick && pair[0].full_solves < pair[1].full_solves
     });
@@ -133,8 +134,7 @@ fn every_order_that_was_answered_is_recorded_and_a_run_that_is_ended_waits_for_i
     assert_ended(code, &summary, 0, "aborted");
     let recording = recording_in(&directory);
     assert_eq!(recording.end, End::Complete);
-    let orders = recording.samples(&topics::ORDERS).unwrap().map(|order| order.unwrap().sample);
-    let orders: Vec<_> = orders.collect();
+    let orders: Vec<_> = recording.samples(&topics::ORDERS).unwrap().map(Result::unwrap).collect();
     let answered: Vec<_> = orders.iter().map(|order| (order.kind(), order.answer())).collect();
     // An order is repeated until it is taken, possibly after its sender has ended.
     let mut rest = answered.iter();
@@ -160,8 +160,12 @@ fn a_run_in_lockstep_waits_for_its_recorder_and_its_log_time_is_mission_time() {
     assert_eq!(replayed(&recording).equal(), 5);
 
     let mission_s = summary["mission_time_s"].as_f64().unwrap();
-    let pose = recording.samples(&topics::POSE).unwrap().map(Result::unwrap);
-    let began: BTreeSet<u64> = pose.map(|pose| pose.log_ns - pose.sample.stamp.stamp_ns).collect();
+    let began_of = |message: Message| {
+        let pose: PoseSample = decode_sample(&message.data)?;
+        Some(message.log_ns - pose.stamp.stamp_ns)
+    };
+    let began = recording.decoded(&["pose"], began_of).unwrap();
+    let began: BTreeSet<u64> = began.map(Result::unwrap).collect();
     assert_eq!(began.len(), 1, "{began:?}");
     let began_ns = *began.first().unwrap();
     let mut drawn = 0;
@@ -172,7 +176,7 @@ fn a_run_in_lockstep_waits_for_its_recorder_and_its_log_time_is_mission_time() {
         drawn += usize::from(&*message.topic == "foxglove/pose" && at_s > mission_s / 2.0);
     }
     assert!(drawn > 10, "{drawn} drawn poses in the second half of {mission_s} s");
-    let mut beats = recording.samples(&topics::HEALTH).unwrap().map(Result::unwrap);
+    let mut beats = recording.messages(&["health"]).unwrap().map(Result::unwrap);
     assert!(beats.any(|beat| (beat.log_ns - began_ns) as f64 * 1e-9 > mission_s / 2.0));
 }
 
@@ -236,7 +240,7 @@ fn a_disk_budget_ends_files_at_a_quarter_of_it_removes_the_oldest_and_each_can_b
     }
     let largest = Recording::open(files.iter().max_by_key(|file| size(file)).unwrap()).unwrap();
     let mut grids = largest.slices(&topics::GRID).unwrap().map(Result::unwrap);
-    assert!(grids.any(|grid| grid.header.part.is_keyframe()), "{files:?}");
+    assert!(grids.any(|(header, _)| header.part.is_keyframe()), "{files:?}");
     assert!(replay(&largest, &all).unwrap().not_replayed() > 0, "{files:?}");
 }
 
@@ -266,13 +270,13 @@ fn the_golden_recording_replays_to_the_bit_and_with_another_constant_differs_wit
 fn a_golden_recording_of_obstacles_a_killed_stage_and_a_stall_replays_to_the_bit() {
     let recording = golden_of("stall-and-kill");
     let stalls = recording.samples(&topics::STALLS).unwrap().count();
-    let deaths = recording.samples(&topics::DEATHS).unwrap().map(|death| death.unwrap().sample);
+    let deaths = recording.samples(&topics::DEATHS).unwrap().map(Result::unwrap);
     let killed: Vec<_> = deaths.map(|death| name_str(&death.stage).to_owned()).collect();
     assert!(stalls > 0);
     assert_eq!(killed, ["mapper"]);
     let mut grids = recording.slices(&topics::GRID).unwrap().map(Result::unwrap);
     let sensed = |cell: &u8| *cell == CellState::Sensed as u8;
-    assert!(grids.any(|grid| grid.elements.iter().any(sensed)), "obstacles");
+    assert!(grids.any(|(_, cells)| cells.iter().any(sensed)), "obstacles");
     let report = replayed(&recording);
     let generations = |stage| report.stages[stage].equal;
     let planners = 1 + stalls as u64;

@@ -294,7 +294,7 @@ pub fn replayed_poses(run: &Path) -> Vec<PoseSample> {
         let recording = Recording::open(&file).unwrap();
         let report = replay(&recording, &Options::default()).unwrap();
         assert!(report.difference.is_none() && report.equal() > 0, "{report}");
-        poses.extend(recording.samples(&topics::POSE).unwrap().map(|pose| pose.unwrap().sample));
+        poses.extend(recording.samples(&topics::POSE).unwrap().map(Result::unwrap));
     }
     assert!(!poses.is_empty());
     poses

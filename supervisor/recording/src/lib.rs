@@ -36,7 +36,7 @@
 //! }
 //! for pose in recording.samples(&topics::POSE)? {
 //!     let pose = pose?;
-//!     println!("{:.3} {:.3}", pose.sample.x_m, pose.sample.y_m);
+//!     println!("{:.3} {:.3}", pose.x_m, pose.y_m);
 //! }
 //! # Ok::<(), recording::RecordingError>(())
 //! ```
@@ -61,7 +61,7 @@ pub use self::{
     error::RecordingError,
     file::now_ns,
     places::{files, next_place, parts},
-    reader::{End, Message, Recording, Sample, SliceSample},
+    reader::{End, Message, Recording},
     recorder::{Options, Tape, record},
     viewers::log_line,
 };

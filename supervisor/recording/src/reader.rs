@@ -66,19 +66,6 @@ pub struct Message {
     pub data: Vec<u8>,
 }
 
-#[derive(Debug)]
-pub struct Sample<P> {
-    pub log_ns: u64,
-    pub sample: P,
-}
-
-#[derive(Debug)]
-pub struct SliceSample<H, T> {
-    pub log_ns: u64,
-    pub header: H,
-    pub elements: Vec<T>,
-}
-
 impl Recording {
     /// Reads run, counts and end of the recording at `path`, a file or a run's directory. Streams
     /// the file once.
@@ -185,22 +172,16 @@ impl Recording {
     pub fn samples<P: Payload + Stamped + Layout>(
         &self,
         topic: &'static Topic<P>,
-    ) -> Result<impl Iterator<Item = Result<Sample<P>>> + use<P>> {
-        self.decoded(&[topic.spec().name], |message| {
-            let sample = decode_sample(&message.data)?;
-            Some(Sample { log_ns: message.log_ns, sample })
-        })
+    ) -> Result<impl Iterator<Item = Result<P>> + use<P>> {
+        self.decoded(&[topic.spec().name], |message| decode_sample(&message.data))
     }
 
     /// Returns the headers and slices of `topic` in file order.
     pub fn slices<H: Payload + Stamped + Layout, T: Payload + Layout>(
         &self,
         topic: &'static Topic<H, T>,
-    ) -> Result<impl Iterator<Item = Result<SliceSample<H, T>>> + use<H, T>> {
-        self.decoded(&[topic.spec().name], |message| {
-            let (header, elements) = decode_slice(&message.data)?;
-            Some(SliceSample { log_ns: message.log_ns, header, elements })
-        })
+    ) -> Result<impl Iterator<Item = Result<(H, Vec<T>)>> + use<H, T>> {
+        self.decoded(&[topic.spec().name], |message| decode_slice(&message.data))
     }
 
     /// Returns what `decode` makes of the messages of the topics in `wanted`, in file order up to a

@@ -76,7 +76,7 @@ pub fn main(arguments: &Arguments) -> Result {
         .collect();
     let mut end_s = 0.0_f64;
     for sample in Recording::open(&run)?.samples(&DOUBTS)? {
-        let sample = sample?.sample;
+        let sample = sample?;
         let at_s = sample.stamp.seconds();
         end_s = end_s.max(at_s);
         for (doubt, (.., evidence)) in doubts.iter_mut().zip(sample.each()) {

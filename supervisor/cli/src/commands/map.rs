@@ -40,8 +40,8 @@ pub fn main(arguments: &Arguments) -> Result {
     let parts = recording::parts(run);
     let recording = Recording::open(parts.last().unwrap_or(run))?;
     for sample in recording.slices(&topics::GRID)? {
-        let sample = sample?;
-        grid.apply(&sample.header.part, &sample.elements);
+        let (header, cells) = sample?;
+        grid.apply(&header.part, &cells);
     }
     let frame = grid.frame().ok_or_else(|| {
         Refused::new("no-map", format!("{} contains no map; give a run that drove", run.display()))

@@ -81,13 +81,13 @@ impl Trace {
         let scales = mission.robot.odometry.wheel_scales();
         let mut endless = BTreeMap::<u64, CountsSample>::new();
         for counts in recording.samples(&COUNTS)? {
-            let counts = counts?.sample;
+            let counts = counts?;
             endless.insert(counts.stamp.tick, counts);
         }
         let mut trace = Self::default();
         let (mut before, mut rolled): (Option<(WheelSample, WheelCounts)>, _) = (None, [0.0; 2]);
         for wheels in recording.samples(&WHEELS)? {
-            let wheels = wheels?.sample;
+            let wheels = wheels?;
             let counts = WheelCounts::of(&wheels, endless.get(&wheels.stamp.tick));
             if let Some((old, earlier)) = before
                 && old.restarts == wheels.restarts
@@ -100,13 +100,13 @@ impl Trace {
             trace.rolled.push((wheels.stamp.seconds(), rolled));
         }
         for command in recording.samples(&COMMAND)? {
-            let command = command?.sample;
+            let command = command?;
             let rims = [command.left_rad_s, command.right_rad_s].map(|it| it * body.wheel_radius_m);
             trace.told.push((command.stamp.seconds(), rims));
         }
         let mut newest = None;
         for link in recording.samples(&LINK)? {
-            let link = link?.sample;
+            let link = link?;
             let at = link.stamp.seconds();
             let told = trace.told.partition_point(|it| it.0 <= at).checked_sub(1);
             let Some((_, rims)) = told.and_then(|it| trace.told.get(it)) else { continue };
@@ -122,19 +122,19 @@ impl Trace {
         }
         let mut before = None;
         for turn in recording.samples(&IMU_TURN)? {
-            let turn = turn?.sample;
+            let turn = turn?;
             // A gap in the sequence numbers means an unknown turn.
             if before.replace(turn.sequence) == turn.sequence.checked_sub(1) {
                 trace.gyro.push((turn.stamp.seconds(), turn.turn_rad));
             }
         }
         for ranges in recording.slices(&RANGES)? {
-            let ranges = ranges?;
-            trace.ranges.push((ranges.header.stamp.seconds(), ranges.elements));
+            let (header, readings) = ranges?;
+            trace.ranges.push((header.stamp.seconds(), readings));
         }
         for scan in recording.slices(&SCAN)? {
-            let scan = scan?;
-            trace.scans.push((scan.header.stamp.seconds(), scan.header, scan.elements));
+            let (header, beams) = scan?;
+            trace.scans.push((header.stamp.seconds(), header, beams));
         }
         Ok(trace)
     }
