@@ -104,8 +104,7 @@ impl<'a> Generations<'a> {
             let death: DeathSample = decode_sample(&message.data)?;
             self.of(name_str(&death.stage), death.generation);
         } else {
-            let writer = topics::TABLE.iter().find(|known| known.spec().name == topic);
-            let writer = writer.map_or("", |topic| topic.spec().writer);
+            let writer = topics::find(topic).map_or("", |topic| topic.spec().writer);
             if let Some(generation) = self.of(writer, stamp_of(&message.data).generation) {
                 let Message { topic, sequence, data, .. } = message;
                 generation.output(&topic, sequence, data);

@@ -182,9 +182,8 @@ impl<'a> Generation<'a> {
 
     fn differs(&mut self, topic: &str, recorded: &[u8], computed: &Computed) {
         let tick = tick_of(recorded);
-        let known = topics::TABLE.iter().find(|known| known.spec().name == topic);
-        let found = known
-            .and_then(|topic| values::first_difference(*topic, [recorded, &computed.message], &[]));
+        let found = topics::find(topic)
+            .and_then(|topic| values::first_difference(topic, [recorded, &computed.message], &[]));
         let (field, [was, is]) = found.unwrap_or_default();
         let describe = |body: &Body| {
             let said = self.replay.as_ref()?.describe(body).ok()?;

@@ -249,8 +249,7 @@ impl Mirror {
     /// Publishes a sample. Counts and drops other messages.
     pub fn take(&mut self, topic: &str, sent: Sent, message: &[u8]) -> Result {
         let stamp = decode_sample::<Stamp>(message).filter(|_| sent.id == self.id);
-        let mut served = topics::TABLE.iter().copied().filter(|topic| may_serve(*topic));
-        let known = served.find(|known| known.spec().name == topic);
+        let known = topics::find(topic).filter(|known| may_serve(*known));
         let (Some(known), Some(stamp)) = (known, stamp) else {
             self.refuse(topic);
             return Ok(());

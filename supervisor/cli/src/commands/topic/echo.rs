@@ -66,8 +66,7 @@ pub fn main(arguments: &Arguments) -> Result {
 }
 
 pub fn readable(name: &str) -> Result<&'static dyn AnyTopic> {
-    let mut all = topics::TABLE.iter();
-    all.find(|topic| topic.spec().name == name).copied().ok_or_else(|| {
+    topics::find(name).ok_or_else(|| {
         let names: Vec<_> = topics::TABLE.iter().map(|topic| topic.spec().name).collect();
         let message = format!("there is no topic {name:?}; there are {}", names.join(", "));
         Refused::new("unknown-topic", message).into()
