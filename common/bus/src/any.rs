@@ -8,7 +8,7 @@ use super::{
     layout::{Kind, Value, type_name},
     make::{Bus, Services},
     payload::{Payload, Stamp, Stamped, decode_slice, encode_slice, has_slice},
-    ports::{self, Carried, OpenedBy, Slice},
+    ports::{self, Carried, OpenedBy},
     read::{Reader, Wakeup},
     spec::Spec,
     topic::Topic,
@@ -36,17 +36,10 @@ pub trait AnyTopic: Sync {
 }
 
 pub trait AnyReader {
-    fn next_sample(&mut self) -> Result<Option<Box<dyn AnySample>>>;
+    /// Takes the next sample and returns its author and stamp, if any.
+    fn next_stamp(&mut self) -> Result<Option<(Author, Stamp)>>;
     /// Replaces `message` by the next sample (see [`super::cdr`]) and returns its stamp, if any.
     fn next_message(&mut self, message: &mut Vec<u8>) -> Result<Option<Stamp>>;
-}
-
-/// Sample in shared memory, which its writer can reuse once it is dropped.
-pub trait AnySample {
-    fn stamp(&self) -> &Stamp;
-    fn author(&self) -> Author;
-    fn value(&self) -> Value;
-    fn elements(&self) -> Option<Vec<Value>>;
 }
 
 pub trait AnyWriter: Any {
@@ -95,8 +88,8 @@ impl<H: Stamped, E: Payload> AnyTopic for Topic<H, E> {
 }
 
 impl<H: Stamped, E: Payload> AnyReader for Reader<H, E> {
-    fn next_sample(&mut self) -> Result<Option<Box<dyn AnySample>>> {
-        Ok(self.next_slice()?.map(|sample| Box::new(sample) as Box<dyn AnySample>))
+    fn next_stamp(&mut self) -> Result<Option<(Author, Stamp)>> {
+        Ok(self.next_slice()?.map(|sample| (sample.author(), *sample.header().stamp())))
     }
 
     fn next_message(&mut self, message: &mut Vec<u8>) -> Result<Option<Stamp>> {
@@ -105,24 +98,6 @@ impl<H: Stamped, E: Payload> AnyReader for Reader<H, E> {
             encode_slice(sample.header(), &sample, message);
             *sample.header().stamp()
         }))
-    }
-}
-
-impl<H: Stamped, E: Payload> AnySample for Slice<H, E> {
-    fn stamp(&self) -> &Stamp {
-        self.header().stamp()
-    }
-
-    fn author(&self) -> Author {
-        Self::author(self)
-    }
-
-    fn value(&self) -> Value {
-        self.header().value()
-    }
-
-    fn elements(&self) -> Option<Vec<Value>> {
-        has_slice::<E>().then(|| self.iter().map(E::value).collect())
     }
 }
 

@@ -37,7 +37,7 @@ pub mod waiter;
 mod write;
 
 pub use self::{
-    any::{AnyReader, AnySample, AnyTopic, AnyWriter},
+    any::{AnyReader, AnyTopic, AnyWriter},
     authors::{Admitted, Author, Ignored, Names, Writers},
     bus_instance::VERSION,
     close_on_exec::close_all_on_exec,

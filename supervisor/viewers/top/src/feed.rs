@@ -65,8 +65,8 @@ impl ScreenFeed {
         let now = Instant::now();
         let due = now.saturating_duration_since(self.counted) >= COUNT_FOR;
         for output in &mut self.outputs {
-            while let Some(sample) = output.reader.next_sample()? {
-                output.rates.add(sample.author(), *sample.stamp(), now);
+            while let Some((author, stamp)) = output.reader.next_stamp()? {
+                output.rates.add(author, stamp, now);
             }
             if due {
                 output.rate_hz = Some(output.rates.report(now).rate_hz);

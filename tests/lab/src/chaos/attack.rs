@@ -196,8 +196,7 @@ impl Attack {
             self.pose = Some(sample);
         }
         for (writer, reader) in &mut subscriptions.outputs {
-            while let Some(sample) = reader.next_sample()? {
-                let stamp = sample.stamp();
+            while let Some((_, stamp)) = reader.next_stamp()? {
                 self.time = self.time.max(Some(stamp.time()));
                 self.on_sign(writer, stamp.generation, false);
                 if *writer == topics::COMMAND.spec().writer {

@@ -41,6 +41,7 @@ pub fn main(arguments: &Arguments) -> Result {
     let mut follower =
         Follower::new(domain, "echo", &topics::LINK, |bus| topic.any_reader(bus)).also_on([topic]);
     let mut waiting = Waiting::default();
+    let mut message = Vec::new();
     let mut left = arguments.number.unwrap_or(u64::MAX);
     while left > 0 && !stream.has_ended() {
         let event = follower.wait(LOOK_EVERY)?;
@@ -48,11 +49,10 @@ pub fn main(arguments: &Arguments) -> Result {
         let Event::Samples(samples) = event else { continue };
         while left > 0
             && !stream.has_ended()
-            && let Some(sample) = samples.next_sample()?
+            && samples.next_message(&mut message)?.is_some()
+            && let Some((header, elements)) = topic.decoded(&message)
         {
-            let fields = sample_text::fields(sample.value(), sample.elements());
-            // A slow reader may block the output, while the writer needs the slot.
-            drop(sample);
+            let fields = sample_text::fields(header, elements);
             let text = if arguments.json {
                 sample_text::json(fields)? + "\n"
             } else {

@@ -67,8 +67,8 @@ pub fn main(arguments: &Arguments) -> Result {
             Event::Nothing => {}
             Event::Samples(readers) => {
                 for (reader, rates) in readers {
-                    while let Some(sample) = reader.next_sample()? {
-                        rates.add(sample.author(), *sample.stamp(), Instant::now());
+                    while let Some((author, stamp)) = reader.next_stamp()? {
+                        rates.add(author, stamp, Instant::now());
                     }
                 }
             }
