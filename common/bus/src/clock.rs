@@ -2,12 +2,7 @@
 //!
 //! Samples carry mission time. Deadlines that detect ended or hung processes use [`monotonic_ns`].
 
-use std::{
-    fmt,
-    ops::{Add, Sub},
-    str::FromStr,
-    time::Duration,
-};
+use std::{fmt, ops::Add, str::FromStr, time::Duration};
 
 use rustix::time::{ClockId, clock_gettime};
 use serde::{Deserialize, Serialize};
@@ -102,7 +97,7 @@ pub fn monotonic_ns() -> u64 {
     now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64
 }
 
-/// Instant of [`monotonic_ns`], with the interface of [`std::time::Instant`].
+/// Instant of [`monotonic_ns`], with the parts of [`std::time::Instant`] that are used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Instant(u64);
 
@@ -125,14 +120,6 @@ impl Add<Duration> for Instant {
 
     fn add(self, after: Duration) -> Self {
         Self(self.0.saturating_add(u64::try_from(after.as_nanos()).unwrap_or(u64::MAX)))
-    }
-}
-
-impl Sub<Duration> for Instant {
-    type Output = Self;
-
-    fn sub(self, before: Duration) -> Self {
-        Self(self.0.saturating_sub(u64::try_from(before.as_nanos()).unwrap_or(u64::MAX)))
     }
 }
 
