@@ -16,10 +16,6 @@ impl Encoder {
         let speed = i32::from(self.speed);
         if self.positive { speed } else { -speed }
     }
-
-    pub fn counts_since(&self, earlier: &Self) -> i32 {
-        counts_between(earlier.position, self.position)
-    }
 }
 
 /// Returns the shorter difference in the cycle; both counts are below [`COUNT_CYCLE`].

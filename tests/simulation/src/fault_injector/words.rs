@@ -7,7 +7,7 @@ use common::{
     mission::Protocol,
     wire::{
         Addressing, COUNT_CYCLE, Command, Decoder, Echo, Encoder, Frame, Motion, MotorSensors,
-        Quantity, Report, did,
+        Quantity, Report, counts_between, did,
     },
 };
 
@@ -92,7 +92,8 @@ impl Said {
         match &parsed {
             Report::Motor(sensors) => {
                 for (channel, now) in sensors.encoders.iter().enumerate() {
-                    counts[channel] += f64::from(now.counts_since(&encoders[channel]));
+                    let rolled = counts_between(encoders[channel].position, now.position);
+                    counts[channel] += f64::from(rolled);
                 }
                 *encoders = sensors.encoders;
                 report.wheels = Some(counts.map(|count| count * COUNT_RAD));
