@@ -8,7 +8,7 @@
 
 use std::{
     cell::{Cell, RefCell},
-    collections::{BTreeMap, VecDeque},
+    collections::{BTreeMap, HashSet, VecDeque},
     mem::MaybeUninit,
     rc::{Rc, Weak},
     slice,
@@ -123,10 +123,10 @@ impl Topic {
         listener
     }
 
-    pub(super) fn reader_numbers(&self) -> impl Iterator<Item = u128> {
+    pub(super) fn reader_numbers(&self) -> HashSet<u128> {
         let readers = self.readers.borrow();
         let live = readers.iter().filter(|(_, queue)| queue.strong_count() > 0);
-        live.map(|(number, _)| *number).collect::<Vec<_>>().into_iter()
+        live.map(|(number, _)| *number).collect()
     }
 
     pub(super) fn wake(&self) {

@@ -350,7 +350,7 @@ impl RawService {
     pub(super) fn readers(&self) -> HashSet<u128> {
         match self {
             Self::Shared(service) => service.readers(),
-            Self::Memory(topic, _) => topic.reader_numbers().collect(),
+            Self::Memory(topic, _) => topic.reader_numbers(),
         }
     }
 }
