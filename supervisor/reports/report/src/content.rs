@@ -11,7 +11,7 @@ use common::{
     mission::{Mission, SensorKind},
     samples::RangeReading,
 };
-use mission_control::Heard;
+use mission_control::{Heard, recovery};
 use page::{Collector, Recorded};
 use recording::{Message, Recording, RecordingError};
 use robot_state::{Kind, Sample, TOPICS};
@@ -72,15 +72,16 @@ impl Content {
         about.push(("began", recording.began.clone()));
         let mut page = Recorded::default();
         page.text(&json!({"about": page::about(run)}));
+        let directory = source::run_directory(recording);
         Self {
             mission: run.mission.clone(),
             about,
-            summary: source::summary(recording).unwrap_or_default(),
+            summary: directory.and_then(recovery::summary).unwrap_or_default(),
             front: Some(run.mission.front_row())
                 .filter(|_| run.mission.front_sonar().kind == SensorKind::Cone),
             collector: Collector::new(&run.mission),
             page,
-            truth: source::run_directory(recording).and_then(truth),
+            truth: directory.and_then(truth),
             map_at_s: f64::NEG_INFINITY,
             ..Self::default()
         }

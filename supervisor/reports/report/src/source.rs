@@ -1,11 +1,9 @@
-//! Recordings of a run, and its summary.
+//! Directories of a recorded run and of its report.
 
 use std::path::{Path, PathBuf};
 
 use common::run::Run;
-use mission_control::recovery;
 use recording::Recording;
-use serde_json::{Map, Value};
 
 pub(crate) fn default_out(run: &Path, file: &Path) -> PathBuf {
     if run.is_dir() {
@@ -14,10 +12,6 @@ pub(crate) fn default_out(run: &Path, file: &Path) -> PathBuf {
     let mut name = file.file_stem().unwrap_or_default().to_owned();
     name.push("-report");
     file.with_file_name(name)
-}
-
-pub(crate) fn summary(recording: &Recording) -> Option<Map<String, Value>> {
-    recovery::summary(run_directory(recording)?)
 }
 
 pub(crate) fn run_directory(recording: &Recording) -> Option<&Path> {
