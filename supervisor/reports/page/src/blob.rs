@@ -17,7 +17,7 @@
 use std::io::Write as _;
 
 use common::{
-    grid::{GridFrame, MAX_CELLS},
+    grid::{Cell, GridFrame, MAX_CELLS},
     samples::FieldCell,
 };
 use flate2::{Compression, write::DeflateEncoder};
@@ -36,15 +36,7 @@ pub enum Shown {
 }
 
 pub fn map(frame: GridFrame, cells: &[u8], time_s: f64) -> Vec<u8> {
-    let header = Header {
-        shown: Shown::Map,
-        cells: frame.cells as usize,
-        side_m: frame.resolution_m,
-        frame,
-        time_s,
-        target: DVec2::ZERO,
-    };
-    header.message(cells)
+    message(Shown::Map, (frame, 1), DVec2::ZERO, time_s, cells)
 }
 
 pub fn field(
@@ -67,8 +59,7 @@ pub fn field(
     }
     directions.append(&mut depths);
     assert!(sent <= MOST_A_SIDE && directions.len() == 2 * sent * sent);
-    let side_m = frame.resolution_m * every as f64;
-    Header { shown, cells: sent, side_m, frame, time_s, target }.message(&directions)
+    message(shown, (frame, every as u32), target, time_s, &directions)
 }
 
 fn direction(cell: FieldCell) -> u8 {
@@ -84,33 +75,28 @@ fn depth(cell: FieldCell) -> u8 {
     if depth.is_finite() { depth.round().clamp(0.0, 254.0) as u8 } else { NONE }
 }
 
-struct Header {
+/// Makes a message of `cells`, which stand for `every` by `every` cells of `frame` each.
+fn message(
     shown: Shown,
-    cells: usize,
-    side_m: f64,
-    frame: GridFrame,
-    time_s: f64,
+    (frame, every): (GridFrame, u32),
     target: DVec2,
-}
-
-impl Header {
-    fn message(&self, cells: &[u8]) -> Vec<u8> {
-        const { assert!(MAX_CELLS <= u16::MAX as u32) };
-        let first = common::grid::Cell { col: 0, row: 0 };
-        let corner = self.frame.corner_of(first);
-        let mut message = vec![self.shown as u8, 0];
-        message.extend((self.cells as u16).to_le_bytes());
-        for value in [self.side_m, corner.x, corner.y] {
-            message.extend((value as f32).to_le_bytes());
-        }
-        message.extend(self.time_s.to_le_bytes());
-        for value in [self.target.x, self.target.y] {
-            message.extend((value as f32).to_le_bytes());
-        }
-        let mut deflated = DeflateEncoder::new(message, Compression::fast());
-        let _ = deflated.write_all(cells);
-        deflated.finish().unwrap_or_default()
+    time_s: f64,
+    cells: &[u8],
+) -> Vec<u8> {
+    const { assert!(MAX_CELLS <= u16::MAX as u32) };
+    let corner = frame.corner_of(Cell { col: 0, row: 0 });
+    let mut message = vec![shown as u8, 0];
+    message.extend(((frame.cells / every) as u16).to_le_bytes());
+    for value in [frame.resolution_m * f64::from(every), corner.x, corner.y] {
+        message.extend((value as f32).to_le_bytes());
     }
+    message.extend(time_s.to_le_bytes());
+    for value in [target.x, target.y] {
+        message.extend((value as f32).to_le_bytes());
+    }
+    let mut deflated = DeflateEncoder::new(message, Compression::fast());
+    let _ = deflated.write_all(cells);
+    deflated.finish().unwrap_or_default()
 }
 
 #[cfg(test)]
