@@ -3,7 +3,6 @@ use std::time::{Duration, Instant};
 use common::{
     bus::{AnyReader, Bus, BusError},
     process_usage::Processes,
-    samples::name_str,
 };
 use console::rates::TopicRates;
 use processes::stages;
@@ -24,7 +23,6 @@ struct Output {
     stage: &'static str,
     reader: Box<dyn AnyReader>,
     rates: TopicRates,
-    rate_hz: Option<f64>,
 }
 
 impl ScreenFeed {
@@ -38,7 +36,6 @@ impl ScreenFeed {
                 stage,
                 reader: topic.any_reader(bus)?,
                 rates: TopicRates::new(topic.spec(), now),
-                rate_hz: None,
             })
         });
         Ok(Self {
@@ -64,23 +61,17 @@ impl ScreenFeed {
     fn count(&mut self, view: &mut View) -> Result<(), BusError> {
         let now = Instant::now();
         let due = now.saturating_duration_since(self.counted) >= COUNT_FOR;
-        for output in &mut self.outputs {
-            while let Some((author, stamp)) = output.reader.next_stamp()? {
-                output.rates.add(author, stamp, now);
+        for Output { stage, reader, rates } in &mut self.outputs {
+            while let Some((author, stamp)) = reader.next_stamp()? {
+                rates.add(author, stamp, now);
             }
             if due {
-                output.rate_hz = Some(output.rates.report(now).rate_hz);
+                view.rates_hz.insert(*stage, rates.report(now).rate_hz);
             }
         }
         if due {
             self.counted = now;
         }
-        let rate = |stage: &str| {
-            let its = self.outputs.iter().find(|output| output.stage == stage);
-            its.and_then(|output| output.rate_hz)
-        };
-        let stages = view.state.stages.iter();
-        view.rates_hz = stages.map(|entry| rate(name_str(&entry.stage))).collect();
         Ok(())
     }
 }

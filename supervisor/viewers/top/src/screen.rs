@@ -136,13 +136,14 @@ fn usage(view: &View, at: usize) -> Usage {
 fn stage_row(view: &View, at: usize, entry: &RosterEntry) -> ([String; 9], Style) {
     let state = entry.state();
     let runs = view.connected && entry.pid != 0;
+    let stage = name_str(&entry.stage);
     let texts = [
-        name_str(&entry.stage).to_owned(),
+        stage.to_owned(),
         robot_state::words(state),
         if runs { entry.pid.to_string() } else { "-".to_owned() },
         entry.generation.to_string(),
         entry.restarts.to_string(),
-        view.rates_hz.get(at).copied().flatten().map_or("-".to_owned(), rate),
+        view.rates_hz.get(stage).map_or("-".to_owned(), |hz| rate(*hz)),
         age(words::seconds(entry.beat_age_ns)),
         cpu(usage(view, at)),
         memory(usage(view, at)),

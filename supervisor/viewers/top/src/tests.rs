@@ -45,7 +45,7 @@ fn view() -> View {
     view.apply(&Sample::Roster(header, entries.to_vec()));
     let usage = Usage { cpu: Some(1.99), memory_bytes: Some(999_900_000) };
     view.usage = vec![usage; STAGES.len() + 1];
-    view.rates_hz = vec![Some(1234.4); STAGES.len()];
+    view.rates_hz = STAGES.map(|stage| (stage, 1234.4)).into();
     view.state.stages[3].state = StageState::BackingOff.into();
     let frame = GridFrame { cells: 100, resolution_m: 0.1, centre: DVec2::ZERO };
     let mut grid = vec![CellState::Free as u8; frame.area()];

@@ -1,4 +1,4 @@
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 use common::{domain::RobotName, process_usage::Usage, samples::name_str};
 use robot_state::{Event, RobotState, Sample};
@@ -12,8 +12,8 @@ pub struct View {
     pub state: RobotState,
     /// Usage of each stage's process, then of the supervisor's. Empty before the first look.
     pub usage: Vec<Usage>,
-    /// Samples per second on each stage's first output. `None` before the first count.
-    pub rates_hz: Vec<Option<f64>>,
+    /// Samples per second on each stage's first output. Empty before the first count.
+    pub rates_hz: BTreeMap<&'static str, f64>,
     pub chosen: usize,
     /// Deaths and stalls, newest first.
     pub events: VecDeque<Event>,
