@@ -1,7 +1,7 @@
 //! Recorded samples of a tick: tick, time, and difference of two.
 
 use common::{
-    bus::{Layout as _, Stamp, cdr::Decoder},
+    bus::{Stamp, decode_sample},
     clock::MissionTime,
     topics::{self, AnyTopic},
 };
@@ -33,8 +33,7 @@ pub struct First {
 }
 
 pub(crate) fn stamp_of(message: &[u8]) -> Stamp {
-    let stamp = Decoder::new(message).and_then(|mut from| Stamp::decode(&mut from));
-    stamp.unwrap_or_default()
+    decode_sample(message).unwrap_or_default()
 }
 
 pub(crate) fn tick_of(message: &[u8]) -> u64 {
