@@ -134,8 +134,9 @@ impl GridFrame {
         self.centre + offset * self.resolution_m
     }
 
-    pub fn corner_of(&self, cell: Cell) -> DVec2 {
-        self.centre_of(cell) - self.resolution_m / 2.0
+    /// Returns the lower left corner of the map.
+    pub fn corner(&self) -> DVec2 {
+        self.centre_of(Cell { col: 0, row: 0 }) - self.resolution_m / 2.0
     }
 
     /// Returns the index in a row-major slice of the whole map.

@@ -5,7 +5,7 @@
 //! `firsthand-foxglove`, which contains the SDK, compare them and decode the messages with it.
 
 use common::{
-    grid::{Cell, CellState, GridFrame},
+    grid::{CellState, GridFrame},
     kinematics::Pose2,
     mission::{Mission, Sensor, SensorKind},
     samples::{GridHeader, Mover, PoseSample, RangeReading, RangeStatus, RangesHeader, ScanHeader},
@@ -271,7 +271,7 @@ fn grid(frame: GridFrame, cells: &[u8], time: &Message) -> Message {
     let field = |(offset, name): (u32, &str)| {
         Message::default().text(1, name).fixed(2, offset).integer(3, UINT8)
     };
-    let corner = Pose2 { position: frame.corner_of(Cell { col: 0, row: 0 }), heading: 0.0 };
+    let corner = Pose2 { position: frame.corner(), heading: 0.0 };
     framed(time, MAP)
         .part(3, &pose(corner))
         .fixed(4, drawn as u32)

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use common::{
     geometry::Box2,
-    grid::{Cell, CellState, GridFrame},
+    grid::{CellState, GridFrame},
     mission::Mission,
 };
 
@@ -86,13 +86,14 @@ pub fn save_believed(
     // Row 0 is the lowest of the grid and the highest of an image.
     let places = (0..side).rev().flat_map(|row| (0..side).map(move |col| (col, row)));
     let pixels: Vec<u8> = places.map(|(col, row)| pixel(col, row)).collect();
-    let corner_m = frame.corner_of(Cell { col: 0, row: 0 }).to_array();
+    let corner_m = frame.corner().to_array();
     ros::save(file, frame.cells as usize, &pixels, frame.resolution_m, corner_m)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use common::grid::Cell;
     use glam::DVec2;
 
     fn mission(text: &str) -> Mission {

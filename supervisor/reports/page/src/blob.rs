@@ -17,7 +17,7 @@
 use std::io::Write as _;
 
 use common::{
-    grid::{Cell, GridFrame, MAX_CELLS},
+    grid::{GridFrame, MAX_CELLS},
     samples::FieldCell,
 };
 use flate2::{Compression, write::DeflateEncoder};
@@ -84,7 +84,7 @@ fn message(
     cells: &[u8],
 ) -> Vec<u8> {
     const { assert!(MAX_CELLS <= u16::MAX as u32) };
-    let corner = frame.corner_of(Cell { col: 0, row: 0 });
+    let corner = frame.corner();
     let mut message = vec![shown as u8, 0];
     message.extend(((frame.cells / every) as u16).to_le_bytes());
     for value in [frame.resolution_m * f64::from(every), corner.x, corner.y] {

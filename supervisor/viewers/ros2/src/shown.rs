@@ -227,7 +227,7 @@ impl Shown {
             && is_due
         {
             self.map = Some((version, now_ns));
-            let [x, y] = frame.corner_of(Cell { col: 0, row: 0 }).to_array();
+            let [x, y] = frame.corner().to_array();
             let info = MapMetaData {
                 map_load_time: now_ns.into(),
                 resolution: frame.resolution_m as f32,
