@@ -64,22 +64,19 @@ fn readings(trace: &Trace, row: usize) -> impl Iterator<Item = (f64, &RangeReadi
 pub(crate) fn liveliness(mission: &Mission, trace: &Trace, turned: bool) -> Vec<Finding> {
     let until = trace.rest_until_s();
     let ticks = trace.rolled.len().max(1) as f64;
-    let mut found = Vec::new();
     let table = mission.sensor_table();
     let sees = |row: usize| readings(trace, row).filter(|it| range_m(it.1).is_some()).count();
-    for (row, sensor) in table.iter().enumerate() {
+    let finding = |(row, sensor): (usize, &Sensor)| {
         let name = &sensor.name;
         if sensor.kind == SensorKind::Scan {
-            found.push(laser_lives(trace, row, sensor));
-            continue;
+            return laser_lives(trace, row, sensor);
         }
         let valid =
             |it: &RangeReading| !matches!(it.status(), RangeStatus::Absent | RangeStatus::Invalid);
         let said = readings(trace, row).filter(|(_, it)| valid(it)).count() as f64;
         if said * (sensor.every_ticks as f64) < LIVES * ticks {
             let text = "it reports nothing in most ticks; check its plug, its name and its row";
-            found.push(Finding::wrong(name, text));
-            continue;
+            return Finding::wrong(name, text);
         }
         let seen_by_others = || {
             let mut others = table.iter().enumerate();
@@ -90,13 +87,11 @@ pub(crate) fn liveliness(mission: &Mission, trace: &Trace, turned: bool) -> Vec<
         };
         if sees(row) == 0 && turned && sensor.kind == SensorKind::Cone && seen_by_others() {
             let text = "it sees nothing all around, although others do; check its plug, its pin and its transmitter";
-            found.push(Finding::wrong(name, text));
-            continue;
+            return Finding::wrong(name, text);
         }
         if sees(row) == 0 {
             let text = "it sees nothing all around; put something within its reach, or check its transmitter";
-            found.push(Finding::unknown(name, text));
-            continue;
+            return Finding::unknown(name, text);
         }
         let mut ranges: Vec<f64> = readings(trace, row)
             .filter(|(at, _)| *at < until)
@@ -108,12 +103,17 @@ pub(crate) fn liveliness(mission: &Mission, trace: &Trace, turned: bool) -> Vec<
             0..4 => 0.0,
             many => (ranges[3 * many / 4] - ranges[many / 4]) / 1.35,
         };
-        found.push(match noise > NOISE_M {
-            true => Finding::wrong(name, format!("its ranges vary by {noise:.2} m although the robot stands; check its supply and its mounting")),
+        match noise > NOISE_M {
+            true => Finding::wrong(
+                name,
+                format!(
+                    "its ranges vary by {noise:.2} m although the robot stands; check its supply and its mounting"
+                ),
+            ),
             false => Finding::right(name, format!("it works; noise at rest {noise:.3} m")),
-        });
-    }
-    found
+        }
+    };
+    table.iter().enumerate().map(finding).collect()
 }
 
 fn laser_lives(trace: &Trace, row: usize, sensor: &Sensor) -> Finding {
