@@ -103,9 +103,10 @@ impl<H: Stamped, E: Payload> AnyReader for Reader<H, E> {
 
 impl<H: Stamped, E: Payload> AnyWriter for Writer<H, E> {
     fn publish_message(&mut self, message: &[u8]) -> Result<bool> {
-        let sample = decode_slice(message);
-        let sent = sample.map(|(header, slice)| self.publish_as_stamped(header, &slice));
-        Ok(sent.transpose()?.is_some())
+        let Some((header, slice)) = decode_slice(message) else { return Ok(false) };
+        self.publisher.send(header, &slice)?;
+        self.wake()?;
+        Ok(true)
     }
 }
 

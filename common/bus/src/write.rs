@@ -45,7 +45,7 @@ impl Bus {
 
 #[derive(Debug)]
 pub struct Writer<H, E = ()> {
-    publisher: Publisher<H, E>,
+    pub(super) publisher: Publisher<H, E>,
     service: Service<H, E>,
     known: HashSet<u128>,
     notifier: Notifier,
@@ -100,12 +100,6 @@ impl<H: Stamped, E: Payload> Writer<H, E> {
         *header.stamp_mut() = Stamp { tick, stamp_ns: time.0, generation, sequence };
         self.sequence = sequence.wrapping_add(1);
         self.publisher.send(header, slice)
-    }
-
-    /// Publishes `header`, with its own stamp, and `slice`, and wakes the readers.
-    pub(super) fn publish_as_stamped(&self, header: H, slice: &[E]) -> Result {
-        self.publisher.send(header, slice)?;
-        self.wake()
     }
 
     pub fn wake(&self) -> Result {
