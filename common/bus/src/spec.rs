@@ -65,7 +65,7 @@ impl Spec {
     }
 
     /// Returns whether at most one process at a time writes the topic.
-    pub(super) fn has_one_writer(&self) -> bool {
+    pub fn has_one_writer(&self) -> bool {
         ![EVERY_STAGE, OPERATOR].contains(&self.writer)
     }
 }

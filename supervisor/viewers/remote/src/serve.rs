@@ -14,7 +14,7 @@ use common::{
     follower::{Event, Follower},
     run,
     samples::{RosterEntry, RosterHeader},
-    topics::{self, AnyTopic, EVERY_STAGE, Logged, OPERATOR},
+    topics::{self, AnyTopic, Logged},
 };
 use console::{
     failure::{Result, refuse},
@@ -65,7 +65,7 @@ struct Told {
 /// act as one.
 pub fn may_serve(topic: &dyn AnyTopic) -> bool {
     let spec = topic.spec();
-    ![OPERATOR, EVERY_STAGE].contains(&spec.writer) && spec.name != topics::MIRROR.spec().name
+    spec.has_one_writer() && spec.name != topics::MIRROR.spec().name
 }
 
 fn topics(named: &[String]) -> Result<Vec<&'static dyn AnyTopic>> {
