@@ -13,9 +13,7 @@ use std::{net::SocketAddr, process::ExitCode};
 use self::live::Live;
 use clap::Parser;
 use common::{domain::RobotName, signals::Signals};
-use console::{
-    addresses, executable, failure::Failure, output::print_text, stream::let_stages_go_first,
-};
+use console::{addresses, failure::Failure, output::print_text, stream::let_stages_go_first};
 
 /// Serve a robot live to Foxglove or Lichtblick.
 ///
@@ -45,12 +43,7 @@ pub struct Arguments {
 
 const LAYOUT: &str = include_str!("../layout.json");
 
-pub fn main() -> ExitCode {
-    // A client could fill the log with its own errors.
-    executable::run("error,firsthand_foxglove=warn,foxglove=off", serve)
-}
-
-fn serve(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub fn serve(arguments: &Arguments) -> Result<ExitCode, Failure> {
     if arguments.layout {
         print_text(LAYOUT)?;
         return Ok(ExitCode::SUCCESS);

@@ -25,9 +25,7 @@ use std::{net::SocketAddr, process::ExitCode, sync::Arc};
 use clap::Parser;
 use common::{domain::RobotName, signals::Signals};
 
-use console::{
-    addresses, executable, failure::Result, output::print_line, stream::let_stages_go_first,
-};
+use console::{addresses, failure::Result, output::print_line, stream::let_stages_go_first};
 
 use self::{access::host_name, serving::Page};
 
@@ -54,11 +52,7 @@ pub struct Arguments {
     behind_proxy: Option<String>,
 }
 
-pub fn main() -> ExitCode {
-    executable::run("error", serve)
-}
-
-fn serve(arguments: &Arguments) -> Result<ExitCode> {
+pub fn serve(arguments: &Arguments) -> Result<ExitCode> {
     let_stages_go_first();
     let mut signals = Signals::that_end()?;
     let driven = arguments.robot.clone();

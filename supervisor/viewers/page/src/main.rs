@@ -1,5 +1,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    firsthand_page::main()
+    console::executable::run("error", firsthand_page::serve)
 }

@@ -22,7 +22,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use console::{executable, failure::Result};
+use console::failure::Result;
 
 /// Show a robot of another machine to all local viewers.
 ///
@@ -46,11 +46,7 @@ enum What {
     List(list::Arguments),
 }
 
-pub fn main() -> ExitCode {
-    executable::run("error", execute)
-}
-
-fn execute(arguments: &Arguments) -> Result<ExitCode> {
+pub fn execute(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.what {
         What::Serve(arguments) => serve::serve(arguments)?,
         What::Show(arguments) => show::show(arguments)?,

@@ -1,5 +1,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    firsthand_remote::main()
+    console::executable::run("error", firsthand_remote::execute)
 }

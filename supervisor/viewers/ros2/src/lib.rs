@@ -28,9 +28,7 @@ use std::{net::Ipv4Addr, process::ExitCode};
 use clap::{CommandFactory as _, Parser, Subcommand};
 use common::{address::domain_of_environment, domain::RobotName, signals::Signals};
 
-use console::{
-    executable, failure::Failure, item::item, output::print_text, stream::let_stages_go_first,
-};
+use console::{failure::Failure, item::item, output::print_text, stream::let_stages_go_first};
 
 use self::topics::{Accept, Frames, Spec, TABLE};
 
@@ -96,11 +94,6 @@ fn namespace(text: &str) -> Result<String, String> {
     }
 }
 
-pub fn main() -> ExitCode {
-    // Refused requests of other nodes are logged.
-    executable::run("warn,rustdds=off", show)
-}
-
 pub fn topics() -> String {
     let row = |spec: &Spec| {
         let [package, message] = spec.message;
@@ -113,7 +106,7 @@ pub fn topics() -> String {
     TABLE.iter().map(row).collect()
 }
 
-fn show(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub fn show(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let text = match &arguments.command {
         _ if arguments.topics => topics(),
         _ if arguments.rviz => RVIZ.to_owned(),

@@ -1,5 +1,6 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    firsthand_ros2::main()
+    // Refused requests of other nodes are logged.
+    console::executable::run("warn,rustdds=off", firsthand_ros2::show)
 }

@@ -36,7 +36,6 @@ use self::{
     view::View,
 };
 use console::{
-    executable,
     failure::{Result, refuse},
     stream::let_stages_go_first,
 };
@@ -64,11 +63,7 @@ enum TopError {
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 const DRAW_EVERY: Duration = Duration::from_millis(200);
 
-pub fn main() -> ExitCode {
-    executable::run("error", show_on_terminal)
-}
-
-fn show_on_terminal(arguments: &Arguments) -> Result<ExitCode> {
+pub fn show_on_terminal(arguments: &Arguments) -> Result<ExitCode> {
     if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
         let message =
             "top needs a terminal; elsewhere use `firsthand status` and `firsthand topic hz`";

@@ -1,5 +1,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    firsthand_top::main()
+    console::executable::run("error", firsthand_top::show_on_terminal)
 }
