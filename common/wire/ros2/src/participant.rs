@@ -211,10 +211,6 @@ impl Participant {
     pub fn bell(&self) -> Waker {
         self.bell.clone()
     }
-
-    pub fn gid(&self) -> Gid {
-        self.inner.guid().to_bytes()
-    }
 }
 
 /// Length of Cyclone DDS's request prefix, repeated in the reply: client and request numbers of 8
@@ -272,10 +268,6 @@ impl Reader {
     /// Yields the messages; endless while a writer floods the topic.
     pub fn messages(&self) -> impl Iterator<Item = Message> {
         std::iter::from_fn(|| self.take())
-    }
-
-    pub fn gid(&self) -> Gid {
-        self.inner.guid().to_bytes()
     }
 }
 
@@ -360,10 +352,6 @@ impl Writer {
     /// Returns whether the library took it.
     pub fn write(&self, payload: Payload) -> bool {
         self.0.write(payload, None).is_ok()
-    }
-
-    pub fn gid(&self) -> Gid {
-        self.0.guid().to_bytes()
     }
 }
 
@@ -457,8 +445,14 @@ impl AsFd for Participant {
     }
 }
 
-macro_rules! debug_by_guid {
+macro_rules! named_by_guid {
     ($($name:ident.$inner:tt)*) => {$(
+        impl $name {
+            pub fn gid(&self) -> Gid {
+                self.$inner.guid().to_bytes()
+            }
+        }
+
         impl fmt::Debug for $name {
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 write!(f, "{} {:?}", stringify!($name), self.$inner.guid())
@@ -467,7 +461,7 @@ macro_rules! debug_by_guid {
     )*};
 }
 
-debug_by_guid! { Participant.inner Reader.inner Writer.0 }
+named_by_guid! { Participant.inner Reader.inner Writer.0 }
 
 #[cfg(test)]
 mod tests {
