@@ -6,7 +6,7 @@ use super::{
     authors::Author,
     error::Result,
     layout::{Kind, Value, type_name},
-    make::{Bus, Services},
+    make::Bus,
     payload::{Payload, Stamp, Stamped, decode_slice, encode_slice, has_slice},
     ports::{self, Carried, OpenedBy},
     read::{Reader, Wakeup},
@@ -14,7 +14,6 @@ use super::{
     topic::Topic,
     write::Writer,
 };
-use crate::domain::Domain;
 
 pub trait AnyTopic: Sync {
     fn spec(&self) -> &'static Spec;
@@ -111,15 +110,6 @@ impl<H: Stamped, E: Payload> AnyWriter for Writer<H, E> {
 }
 
 impl Bus {
-    /// Creates a robot's bus: its configuration, which consumers in all languages load, and the
-    /// services of all topics in `table`.
-    ///
-    /// It replaces an earlier bus, and can be joined only once all services exist. Only the
-    /// supervisor calls this.
-    pub fn make(domain: &Domain, name: &str, table: &[&dyn AnyTopic]) -> Result<(Self, Services)> {
-        Self::make_services(domain, name, table.iter().map(|topic| (topic.spec(), topic.carried())))
-    }
-
     pub fn wakeup(&self, topic: &dyn AnyTopic) -> Result<Wakeup> {
         Wakeup::open(self, topic.spec())
     }

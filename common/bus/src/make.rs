@@ -23,11 +23,12 @@ use iceoryx2::{
 };
 
 use super::{
+    any::AnyTopic,
     authors::Writers,
     error::{BusError, Result},
     leftovers, ownership,
-    ports::{self, BusNode, Carried, Medium, Memory},
-    spec::{Limits, Spec},
+    ports::{self, BusNode, Medium, Memory},
+    spec::Limits,
 };
 use crate::{
     bus_instance::BusInstance,
@@ -59,11 +60,12 @@ fn not_running(domain: &Domain) -> impl Fn(io::Error) -> BusError {
 }
 
 impl Bus {
-    pub(super) fn make_services(
-        domain: &Domain,
-        name: &str,
-        topics: impl Iterator<Item = (&'static Spec, Carried)>,
-    ) -> Result<(Self, Services)> {
+    /// Creates a robot's bus: its configuration, which consumers in all languages load, and the
+    /// services of all topics in `table`.
+    ///
+    /// It replaces an earlier bus, and can be joined only once all services exist. Only the
+    /// supervisor calls this.
+    pub fn make(domain: &Domain, name: &str, table: &[&dyn AnyTopic]) -> Result<(Self, Services)> {
         let failed = no_join(domain);
         let instance = BusInstance::new(domain);
         // An existing directory is an error, because another user may have created it.
@@ -75,8 +77,8 @@ impl Bus {
         bus.is_stage = true;
         let mut services = Vec::new();
         if let Medium::Shared { node, instance } = &bus.medium {
-            for (spec, carried) in topics {
-                services.push(ports::create(node, spec, &carried)?);
+            for topic in table {
+                services.push(ports::create(node, topic.spec(), &topic.carried())?);
             }
             leftovers::back_up(&services_of(node), &backup_of(node)).map_err(&failed)?;
             instance.make_current().map_err(failed)?;
