@@ -9,7 +9,7 @@ use super::{
     make::Bus,
     payload::{Payload, Stamp, Stamped, decode_slice, encode_slice, has_slice},
     ports::{self, Carried, OpenedBy},
-    read::{Reader, Wakeup},
+    read::Reader,
     spec::Spec,
     topic::Topic,
     write::Writer,
@@ -106,11 +106,5 @@ impl<H: Stamped, E: Payload> AnyWriter for Writer<H, E> {
         self.publisher.send(header, &slice)?;
         self.wake()?;
         Ok(true)
-    }
-}
-
-impl Bus {
-    pub fn wakeup(&self, topic: &dyn AnyTopic) -> Result<Wakeup> {
-        Wakeup::open(self, topic.spec())
     }
 }

@@ -8,6 +8,7 @@ use std::{
 };
 
 use super::{
+    any::AnyTopic,
     authors::Admitted,
     error::{BusError, Result},
     make::Bus,
@@ -47,6 +48,13 @@ impl Bus {
             service.subscriber(buffer)
         })?;
         Ok(Reader { subscriber, admitted: Admitted::of(topic.spec, self.writers.as_ref()) })
+    }
+
+    pub fn wakeup(&self, topic: &dyn AnyTopic) -> Result<Wakeup> {
+        let spec = topic.spec();
+        let admit = |taken| self.leave_places(spec, Limits::LISTENERS, taken);
+        let listener = self.once_freed(|| Listener::open(&self.medium, spec, admit))?;
+        Ok(Wakeup { listener, had_events: Cell::new(false) })
     }
 
     /// Opens an endpoint. A consumer waits for places of killed processes, which the supervisor
@@ -133,12 +141,6 @@ pub struct Wakeup {
 }
 
 impl Wakeup {
-    pub(super) fn open(bus: &Bus, spec: &'static Spec) -> Result<Self> {
-        let admit = |taken| bus.leave_places(spec, Limits::LISTENERS, taken);
-        let listener = bus.once_freed(|| Listener::open(&bus.medium, spec, admit))?;
-        Ok(Self { listener, had_events: Cell::new(false) })
-    }
-
     /// Clears the wakeup and returns whether it had an event. Call it before taking the samples.
     pub(crate) fn drain(&self) -> Result<bool> {
         let had_events = self.listener.drain()?;
