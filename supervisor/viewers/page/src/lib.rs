@@ -58,6 +58,6 @@ pub fn serve(arguments: &Arguments) -> Result<ExitCode> {
     let driven = arguments.robot.clone();
     let page = Page::open(arguments, Arc::new(move |order| operator::perform(&driven, order)))?;
     print_line(format_args!("{}kept in {}", page.access.addresses(), page.kept.display()))?;
-    page.show(&mut || signals.came());
+    robot::follow(&arguments.robot.domain(), &page.shared, &mut || signals.came());
     Ok(ExitCode::SUCCESS)
 }

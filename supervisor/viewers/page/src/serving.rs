@@ -17,7 +17,7 @@ use processes::domain::make_own_directory;
 use thiserror::Error;
 
 use crate::{
-    Arguments, access::Access, context::Context, orders::Operator, places::Places, robot, server,
+    Arguments, access::Access, context::Context, orders::Operator, places::Places, server,
     shared::Shared,
 };
 
@@ -36,7 +36,6 @@ pub struct Page {
     pub access: Arc<Access>,
     /// File with the addresses, removed with the page.
     pub kept: PathBuf,
-    domain: Domain,
     pub shared: Arc<Shared>,
     server: Option<(tokio::sync::oneshot::Sender<()>, thread::JoinHandle<()>)>,
 }
@@ -70,8 +69,7 @@ impl Page {
         listener.set_nonblocking(true)?;
         let address = listener.local_addr()?;
         let access = Arc::new(Access::new(address, arguments.behind_proxy.as_deref())?);
-        let domain = arguments.robot.domain();
-        let kept = keep(&domain, address.port(), &access.addresses())?;
+        let kept = keep(&arguments.robot.domain(), address.port(), &access.addresses())?;
         let shared = Arc::new(Shared::default());
         let context = Arc::new(Context {
             access: access.clone(),
@@ -95,11 +93,7 @@ impl Page {
             });
             runtime.shutdown_timeout(Duration::from_secs(1));
         })?;
-        Ok(Self { access, kept, domain, shared, server: Some((end, thread)) })
-    }
-
-    pub fn show(&self, ended: &mut dyn FnMut() -> bool) {
-        robot::follow(&self.domain, &self.shared, ended);
+        Ok(Self { access, kept, shared, server: Some((end, thread)) })
     }
 }
 
