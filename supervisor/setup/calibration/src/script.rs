@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     loops::Wheels,
-    wall::{FAST_RAD, Order, SPEED_M_S, State, direction_aside},
+    wall::{FAST_RAD, Order, SPEED_M_S, direction_aside},
     ways::Ways,
 };
 
@@ -117,10 +117,6 @@ impl Script {
         }
     }
 
-    pub fn state(&self) -> State {
-        if self.leg().is_none() { State::Finished } else { State::Running }
-    }
-
     /// Advances by a tick.
     ///
     /// `echo_m` is the front sonar's, or a laser's for a gyro. A robot that drives on a turn
@@ -186,7 +182,7 @@ mod tests {
         for counts_a_tick in [0, 40] {
             let mut procedure = Script::new(Procedure::BringUp, 0.0, 10.0);
             let (mut ticks, mut counts) = (0, [0_u16; 2]);
-            while procedure.state() == State::Running {
+            while procedure.leg().is_some() {
                 let order = procedure.step(counts, None, &body);
                 if order.status == GuidanceStatus::Look || order.speed_limit_m_s > 0.0 {
                     counts = counts.map(|it| it.wrapping_add(counts_a_tick) % 32768);

@@ -3,10 +3,7 @@ use common::{mission::Procedure, samples::GuidanceStatus};
 use super::*;
 use crate::{
     script::Script,
-    wall::{
-        State,
-        tests::{body, counts_of, obeyed},
-    },
+    wall::tests::{body, counts_of, obeyed},
 };
 
 /// Drives a square with wheels of this ratio and track, without slip.
@@ -27,7 +24,8 @@ fn drive(ratio: f64, track: f64, to_the_left: bool) -> Driven {
         let turned = wheels.turned(left, right, body().track_m);
         pose = pose.along_arc(f64::midpoint(left, right), turned);
     }
-    assert_eq!(square.state(), State::Finished);
+    let last = square.step(counts_of(nominal), None, &body());
+    assert_eq!(last.status, GuidanceStatus::AtTarget);
     Driven { ways, end: pose.position }
 }
 
