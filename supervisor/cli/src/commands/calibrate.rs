@@ -160,7 +160,7 @@ fn by_wall(arguments: &Arguments, mission: &Mission) -> Result<Found> {
             )));
         }
     }
-    let (estimate, _) =
+    let estimate =
         loops::checked(&wall.loops, wall.normal_sd(), mission.body().track_m).map_err(refused)?;
     Ok(Found { method: "wall", estimate, metres: wall.metres(), seconds })
 }

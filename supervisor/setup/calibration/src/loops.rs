@@ -302,17 +302,13 @@ impl Estimate {
     }
 }
 
-/// Returns the estimate and the loops used.
+/// Returns the estimate.
 ///
 /// Drops at most one accident. The two held-out loops must lie where the others predict.
 ///
 /// # Errors
 /// Returns why nothing may be written.
-pub fn checked(
-    loops: &[Loop],
-    normal_sd: f64,
-    track_m: f64,
-) -> Result<(Estimate, Vec<Loop>), Refusal> {
+pub fn checked(loops: &[Loop], normal_sd: f64, track_m: f64) -> Result<Estimate, Refusal> {
     if loops.len() < FEWEST_LOOPS {
         return Err(Refusal::TooFew { found: loops.len() });
     }
@@ -345,7 +341,7 @@ pub fn checked(
     for held_out in held_out {
         by_others.agrees_with(&by_loops(&[*held_out]))?;
     }
-    Ok((Estimate::of(&by_loops(&used))?.unless_scattered()?, used))
+    Estimate::of(&by_loops(&used))?.unless_scattered()
 }
 
 #[cfg(test)]

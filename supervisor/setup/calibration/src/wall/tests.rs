@@ -76,7 +76,7 @@ fn a_robot_that_does_not_slip_is_calibrated_to_a_thousandth_and_stands_where_it_
         let wall = run(&mut robot, CalibrationPlan::default());
         assert_eq!(wall.state(), State::Finished);
         assert!(wall.loops.len() >= FEWEST_LOOPS);
-        let (estimate, _) =
+        let estimate =
             crate::loops::checked(&wall.loops, wall.normal_sd(), body().track_m).unwrap();
         assert!((estimate.ratio() - ratio).abs() < 0.001, "{ratio}: {}", estimate.ratio());
         assert!((estimate.track() - track).abs() < 0.002, "{track}: {}", estimate.track());
