@@ -61,12 +61,6 @@ pub struct Server {
     pub newest_target: u64,
 }
 
-#[derive(Clone, Copy, Debug)]
-pub struct Sent {
-    pub id: Uuid,
-    pub point: TargetPoint,
-}
-
 impl Server {
     /// Fails on a malformed payload.
     pub fn read_goal(payload: &[u8]) -> Result<(Uuid, Result<TargetPoint, Refusal>), Malformed> {
@@ -75,10 +69,10 @@ impl Server {
     }
 
     /// Takes an accepted goal, whose target follows the one numbered `after`.
-    pub fn accept(&mut self, sent: Sent, after: u64, now_ns: u64) {
+    pub fn accept(&mut self, (id, point): (Uuid, TargetPoint), after: u64, now_ns: u64) {
         self.abort("a newer goal replaced it");
-        let aim = Aim { point: sent.point, after, ..Aim::default() };
-        self.goals.accept(sent.id, aim, now_ns);
+        let aim = Aim { point, after, ..Aim::default() };
+        self.goals.accept(id, aim, now_ns);
     }
 
     /// Takes a goal that failed before it began, beside the current one.

@@ -28,7 +28,7 @@ use thiserror::Error;
 
 use crate::{
     Arguments,
-    action::{Refusal, Sent, Server},
+    action::{Refusal, Server},
     asked,
     endpoints::{self, is_of_robot, published},
     frames::Frames as Transforms,
@@ -320,9 +320,8 @@ impl Bridge<'_> {
                 })?;
                 match point {
                     Ok(point) => {
-                        let (request, sent) = (request.clone(), Sent { id, point });
-                        let after = self.server.newest_target;
-                        self.go(point, Why::Action { request, sent, after });
+                        let (request, after) = (request.clone(), self.server.newest_target);
+                        self.go(point, Why::Action { request, id, after });
                     }
                     Err(refusal) => {
                         self.refuse(request, id, &refusal);
@@ -355,24 +354,24 @@ impl Bridge<'_> {
             self.tell(&format!("a request failed: {}", why.text));
         }
         match order {
-            Order::Go { why, resumes, .. } => {
+            Order::Go { to, resumes, why } => {
                 if resumes && result.is_ok() {
                     self.stands_for_cancel = None;
                 }
-                if let Why::Action { request, sent, after } = why {
+                if let Why::Action { request, id, after } = why {
                     let now_ns = self.now_ns();
                     match result {
                         Ok(()) => {
                             let reply = reply_to_goal(true, now_ns);
                             self.node.reply(0, Call::SendGoal, &request, &reply);
-                            self.server.accept(sent, after, now_ns);
+                            self.server.accept((id, to), after, now_ns);
                             // Its target may have preceded the supervisor's answer.
                             if let Some(target) = self.shown.as_ref().and_then(|it| it.state.target)
                             {
                                 self.server.target(&target);
                             }
                         }
-                        Err(why) => self.refuse(&request, sent.id, &why),
+                        Err(why) => self.refuse(&request, id, &why),
                     }
                 }
             }

@@ -22,7 +22,7 @@ use ros2::{
     participant::Request,
 };
 
-use crate::action::{Refusal, Sent};
+use crate::{action::Refusal, goals::Uuid};
 
 const MOST_WAITING: usize = 16;
 
@@ -51,7 +51,7 @@ pub enum Why {
     /// Action client. The goal's target follows the one numbered `after`.
     Action {
         request: Request,
-        sent: Sent,
+        id: Uuid,
         after: u64,
     },
 }

@@ -17,9 +17,12 @@ use ros2::{
 
 use crate::{
     RVIZ,
-    action::{Sent, Server},
+    action::Server,
     asked,
-    goals::Status::{Aborted, Canceled, Succeeded},
+    goals::{
+        Status::{Aborted, Canceled, Succeeded},
+        Uuid,
+    },
     messages::{self, disc, lines},
     shown::Shown,
     topics::{Id, TABLE},
@@ -120,9 +123,9 @@ fn cancel(id: u8) -> Vec<u8> {
     CancelGoalRequest { goal_info }.encode()
 }
 
-fn sent(id: u8) -> Sent {
+fn sent(id: u8) -> (Uuid, TargetPoint) {
     let (id, point) = Server::read_goal(&goal(id, "map")).unwrap();
-    Sent { id, point: point.unwrap() }
+    (id, point.unwrap())
 }
 
 /// Returns the state of the goal `id`, its error code and its text.
