@@ -29,43 +29,23 @@ use super::{
 };
 
 #[derive(Debug)]
-pub(super) struct Service<H, E> {
-    raw: RawService,
-    spec: &'static Spec,
-    carries: PhantomData<fn() -> (H, E)>,
-}
-
-impl<H: Payload, E: Payload> Service<H, E> {
-    pub(super) fn open(medium: &Medium, spec: &'static Spec) -> Result<Self> {
-        let raw = RawService::open(medium, spec, &Carried::of::<H, E>())?;
-        Ok(Self { raw, spec, carries: PhantomData })
-    }
-
-    pub(super) fn publisher(&self, longest: usize) -> Result<Publisher<H, E>> {
-        let longest = if has_slice::<E>() { longest } else { 1 };
-        Ok(Publisher { raw: self.raw.publisher(self.spec, longest)?, carries: PhantomData })
-    }
-
-    pub(super) fn subscriber(&self, buffer: usize) -> Result<Subscriber<H, E>> {
-        Ok(Subscriber {
-            raw: self.raw.subscriber(self.spec, buffer)?,
-            spec: self.spec,
-            carries: PhantomData,
-        })
-    }
-
-    pub(super) fn readers(&self) -> HashSet<u128> {
-        self.raw.readers()
-    }
-}
-
-#[derive(Debug)]
 pub(super) struct Publisher<H, E> {
     raw: RawPublisher,
+    service: RawService,
     carries: PhantomData<fn() -> (H, E)>,
 }
 
 impl<H: Payload, E: Payload> Publisher<H, E> {
+    pub(super) fn open(medium: &Medium, spec: &Spec, longest: usize) -> Result<Self> {
+        let service = RawService::open(medium, spec, &Carried::of::<H, E>())?;
+        let longest = if has_slice::<E>() { longest } else { 1 };
+        Ok(Self { raw: service.publisher(spec, longest)?, service, carries: PhantomData })
+    }
+
+    pub(super) fn readers(&self) -> HashSet<u128> {
+        self.service.readers()
+    }
+
     pub(super) const fn topic(&self) -> &'static str {
         self.raw.topic
     }
@@ -101,6 +81,18 @@ pub(super) struct Subscriber<H, E> {
 }
 
 impl<H: Payload, E: Payload> Subscriber<H, E> {
+    /// Reads a topic if `admit` accepts the number of present readers.
+    pub(super) fn open(
+        medium: &Medium,
+        spec: &'static Spec,
+        buffer: usize,
+        admit: impl FnOnce(usize) -> Result,
+    ) -> Result<Self> {
+        let service = RawService::open(medium, spec, &Carried::of::<H, E>())?;
+        admit(service.readers().len())?;
+        Ok(Self { raw: service.subscriber(spec, buffer)?, spec, carries: PhantomData })
+    }
+
     pub(super) fn receive(&self) -> Result<Option<Slice<H, E>>> {
         let raw = self.raw.receive_sample(self.spec)?;
         Ok(raw.map(|raw| Slice { raw, carries: PhantomData }))

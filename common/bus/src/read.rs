@@ -13,7 +13,7 @@ use super::{
     error::{BusError, Result},
     make::Bus,
     payload::{Payload, Stamped},
-    ports::{Listener, Service, Slice, Subscriber},
+    ports::{Listener, Slice, Subscriber},
     spec::{Limits, Spec},
     topic::Topic,
 };
@@ -42,12 +42,10 @@ impl Bus {
         buffer: usize,
     ) -> Result<Reader<H, E>> {
         assert!(buffer > 0 && buffer <= topic.spec.limits.recorder_buffer);
-        let subscriber = self.once_freed(|| {
-            let service = Service::open(&self.medium, topic.spec)?;
-            self.leave_places(topic.spec, topic.spec.limits.readers, service.readers().len())?;
-            service.subscriber(buffer)
-        })?;
-        Ok(Reader { subscriber, admitted: Admitted::of(topic.spec, self.writers.as_ref()) })
+        let spec = topic.spec;
+        let admit = |taken| self.leave_places(spec, spec.limits.readers, taken);
+        let subscriber = self.once_freed(|| Subscriber::open(&self.medium, spec, buffer, admit))?;
+        Ok(Reader { subscriber, admitted: Admitted::of(spec, self.writers.as_ref()) })
     }
 
     pub fn wakeup(&self, topic: &dyn AnyTopic) -> Result<Wakeup> {

@@ -7,7 +7,7 @@ use super::{
     error::{BusError, Result},
     make::Bus,
     payload::{Payload, Stamp, Stamped},
-    ports::{Notifier, Publisher, Service},
+    ports::{Notifier, Publisher},
     spec::Limits,
     topic::Topic,
 };
@@ -30,10 +30,9 @@ impl Bus {
         longest: usize,
     ) -> Result<Writer<H, E>> {
         let _held = self.hold()?;
-        let service = Service::open(&self.medium, topic.spec)?;
+        let longest = longest.min(topic.spec.limits.longest);
         Ok(Writer {
-            publisher: service.publisher(longest.min(topic.spec.limits.longest))?,
-            service,
+            publisher: Publisher::open(&self.medium, topic.spec, longest)?,
             known: HashSet::new(),
             notifier: Notifier::open(&self.medium, topic.spec)?,
             generation,
@@ -46,7 +45,6 @@ impl Bus {
 #[derive(Debug)]
 pub struct Writer<H, E = ()> {
     pub(super) publisher: Publisher<H, E>,
-    service: Service<H, E>,
     known: HashSet<u128>,
     notifier: Notifier,
     generation: u32,
@@ -107,7 +105,7 @@ impl<H: Stamped, E: Payload> Writer<H, E> {
     }
 
     pub fn has_new_reader(&mut self) -> bool {
-        let now = self.service.readers();
+        let now = self.publisher.readers();
         let new = !now.is_subset(&self.known);
         self.known = now;
         new
