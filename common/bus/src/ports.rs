@@ -32,14 +32,15 @@ use super::{
 pub(super) struct Publisher<H, E> {
     raw: RawPublisher,
     service: RawService,
+    spec: &'static Spec,
     carries: PhantomData<fn() -> (H, E)>,
 }
 
 impl<H: Payload, E: Payload> Publisher<H, E> {
-    pub(super) fn open(medium: &Medium, spec: &Spec, longest: usize) -> Result<Self> {
+    pub(super) fn open(medium: &Medium, spec: &'static Spec, longest: usize) -> Result<Self> {
         let service = RawService::open(medium, spec, &Carried::of::<H, E>())?;
         let longest = if has_slice::<E>() { longest } else { 1 };
-        Ok(Self { raw: service.publisher(spec, longest)?, service, carries: PhantomData })
+        Ok(Self { raw: service.publisher(spec, longest)?, service, spec, carries: PhantomData })
     }
 
     pub(super) fn readers(&self) -> HashSet<u128> {
@@ -47,12 +48,12 @@ impl<H: Payload, E: Payload> Publisher<H, E> {
     }
 
     pub(super) const fn topic(&self) -> &'static str {
-        self.raw.topic
+        self.spec.name
     }
 
     pub(super) fn send(&self, header: H, slice: &[E]) -> Result {
         let count = if has_slice::<E>() { slice.len() } else { 1 };
-        self.raw.send(count, &mut |loan| {
+        self.raw.send(self.spec.name, count, &mut |loan| {
             let place = match has_slice::<E>() {
                 true => loan.header.addr(),
                 false => loan.elements.as_mut_ptr().expose_provenance(),

@@ -302,8 +302,7 @@ impl SharedService {
             || unsafe { port.loan_custom_payload(longest) }.map_err(refused("write", spec.name));
         let first = [loan()?, loan()?];
         let first = first.each_ref().map(|sample| ptr::from_ref(sample.header()).addr());
-        let port = PublisherTo::Shared { places: Places::of_segment(first), port };
-        Ok(RawPublisher { port, topic: spec.name })
+        Ok(RawPublisher::Shared { places: Places::of_segment(first), port })
     }
 
     fn readers(&self) -> HashSet<u128> {
@@ -328,13 +327,12 @@ impl RawService {
     }
 
     pub(super) fn publisher(&self, spec: &Spec, longest: usize) -> Result<RawPublisher> {
-        match self {
-            Self::Shared(service) => service.publisher(spec, longest),
+        Ok(match self {
+            Self::Shared(service) => service.publisher(spec, longest)?,
             Self::Memory(topic, carried) => {
-                let port = PublisherTo::Memory(Rc::clone(topic), topic.write(), *carried);
-                Ok(RawPublisher { port, topic: spec.name })
+                RawPublisher::Memory(Rc::clone(topic), topic.write(), *carried)
             }
-        }
+        })
     }
 
     pub(super) fn subscriber(&self, spec: &Spec, buffer: usize) -> Result<RawSubscriber> {
@@ -361,13 +359,7 @@ pub(super) struct Loan<'a> {
 }
 
 #[derive(Debug)]
-pub(super) struct RawPublisher {
-    port: PublisherTo,
-    pub topic: &'static str,
-}
-
-#[derive(Debug)]
-enum PublisherTo {
+pub(super) enum RawPublisher {
     Shared { port: PublisherPort, places: Places },
     Memory(Rc<memory::Topic>, Rc<memory::Writer>, Carried),
 }
@@ -375,11 +367,15 @@ enum PublisherTo {
 impl RawPublisher {
     /// Publishes a sample. `fill` writes the header and all elements, or returns false if they do
     /// not fit.
-    pub(super) fn send(&self, elements: usize, fill: &mut dyn FnMut(Loan<'_>) -> bool) -> Result {
-        let topic = self.topic;
-        let (port, places) = match &self.port {
-            PublisherTo::Shared { port, places } => (port, places),
-            PublisherTo::Memory(memory, writer, carried) => {
+    pub(super) fn send(
+        &self,
+        topic: &'static str,
+        elements: usize,
+        fill: &mut dyn FnMut(Loan<'_>) -> bool,
+    ) -> Result {
+        let (port, places) = match self {
+            Self::Shared { port, places } => (port, places),
+            Self::Memory(memory, writer, carried) => {
                 alive(topic)?;
                 let sent = memory.send(writer, carried, elements, fill);
                 return if sent { Ok(()) } else { Err(BusError::Incompatible { topic }) };
