@@ -244,7 +244,6 @@ impl<'a> Server<'a> {
         };
         let planner = Planner::new(body, options.screening);
         let (jobs, done) = start_planning(planner, node.participant.bell())?;
-        let goals = <[Goals<Plan>; 2]>::default();
         Ok(Self {
             options,
             node,
@@ -252,7 +251,7 @@ impl<'a> Server<'a> {
             map: None,
             clock_ns: 0,
             clients: BTreeMap::new(),
-            goals,
+            goals: Default::default(),
             jobs,
             done,
         })
