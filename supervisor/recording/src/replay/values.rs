@@ -14,10 +14,9 @@ pub fn first_difference(
         values.retain(|(field, _)| !left_out.iter().any(|end| field.ends_with(end)));
         values
     });
-    let differs = first.iter().zip(&second).find(|(one, other)| one != other);
     let counts = [first.len(), second.len()];
-    match differs {
-        Some(((field, one), (_, other))) => Some((field.clone(), [one.clone(), other.clone()])),
+    match first.into_iter().zip(second).find(|(one, other)| one != other) {
+        Some(((field, one), (_, other))) => Some((field, [one, other])),
         None => (counts[0] != counts[1])
             .then(|| ("number of elements".to_owned(), counts.map(|count| count.to_string()))),
     }
