@@ -110,10 +110,8 @@ pub fn lines(state: &RobotState, width: u16, height: u16) -> Option<Vec<Line<'st
     if let Some(pose) = state.pose {
         put(pose.pose().position, robot(pose.heading_rad), ROBOT_STYLE);
     }
-    let line = |letters: Vec<(char, Style)>| {
-        let spans =
-            letters.into_iter().map(|(letter, style)| Span::styled(letter.to_string(), style));
-        Line::from(spans.collect::<Vec<_>>())
+    let line = |letters: Vec<(char, Style)>| -> Line<'static> {
+        letters.into_iter().map(|(letter, style)| Span::styled(letter.to_string(), style)).collect()
     };
     Some(letters.into_iter().map(line).collect())
 }

@@ -87,7 +87,7 @@ fn explained(
     let spans = signs.into_iter().flat_map(|(sign, style, what)| {
         [Span::styled(sign.to_string(), style), Span::styled(format!(" {what}  "), DIM)]
     });
-    Line::from(spans.collect::<Vec<_>>())
+    spans.collect()
 }
 
 fn table(view: &View, frame: &mut Frame<'_>, area: Rect) {
