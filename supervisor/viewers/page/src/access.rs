@@ -74,7 +74,7 @@ impl Access {
     }
 
     pub fn is_own_origin(&self, origin: &str, host: &str) -> bool {
-        origin.strip_prefix(self.scheme).and_then(|rest| rest.strip_prefix("://")) == Some(host)
+        origin == format!("{}://{host}", self.scheme)
     }
 
     pub fn websocket(&self, host: &str) -> String {
