@@ -50,7 +50,8 @@ fn range_m(reading: &RangeReading) -> Option<f64> {
     (reading.status() == RangeStatus::Measured).then_some(reading.range_m)
 }
 
-fn mean(values: &[f64], least: usize) -> Option<f64> {
+fn mean(values: impl Iterator<Item = f64>, least: usize) -> Option<f64> {
+    let values: Vec<f64> = values.collect();
     (values.len() >= least).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
@@ -187,7 +188,7 @@ impl Profile {
         let each = seen.iter().filter_map(|(bearing, range)| {
             Some((self.range(Self::bin(*bearing) + turned)? - range).abs().min(DIFFERENT_M))
         });
-        mean(&each.collect::<Vec<f64>>(), LEAST_SAMPLES)
+        mean(each, LEAST_SAMPLES)
     }
 }
 
@@ -288,7 +289,7 @@ fn others(all: &[Seen<'_>], place: usize) -> Profile {
 fn disagreement(all: &[Seen<'_>]) -> Option<f64> {
     let each =
         all.iter().enumerate().map(|(place, (_, seen))| others(all, place).difference(seen, 0));
-    mean(&each.flatten().collect::<Vec<f64>>(), 2).filter(|_| all.len() > 2)
+    mean(each.flatten(), 2).filter(|_| all.len() > 2)
 }
 
 /// Ratio of true and wheel turns with the best agreement of the sonars.
@@ -313,8 +314,7 @@ impl Turn {
         let others = each.iter().filter(|it| it.1 * best < 0.0);
         let is_told = agrees && others.fold(f64::INFINITY, |m, it| m.min(it.0)) * EXPLAINS > least;
         let alike = each.iter().filter(|it| it.1 * best > 0.0 && it.0 <= ALIKE * least);
-        let logarithms: Vec<f64> = alike.map(|it| it.1.abs().ln()).collect();
-        let scale = mean(&logarithms, 1)?.exp();
+        let scale = mean(alike.map(|it| it.1.abs().ln()), 1)?.exp();
         let is_other = differs(best.signum())
             .is_some_and(|it| it > LEAST_DIFFERENCE_M / 2.0 && least < EXPLAINS * it);
         Some(Self {
@@ -446,5 +446,5 @@ fn share_of_way(
             shares.push(-xy / xx);
         }
     }
-    mean(&shares, 1)
+    mean(shares.into_iter(), 1)
 }
