@@ -72,7 +72,6 @@ readers! {
     }
 }
 
-#[derive(Default)]
 struct FreeByScan {
     half_width_m: f64,
     /// Time of the scan, and the free distance before the body, metres.
@@ -127,8 +126,7 @@ impl Process for Shell {
         let target = TargetSample::first(mission);
         let is_watched =
             plan.procedure == Procedure::Gyro && mission.front_sonar().kind == SensorKind::Scan;
-        let half_width_m = body.radius_m;
-        let scan = is_watched.then(|| FreeByScan { half_width_m, ..FreeByScan::default() });
+        let scan = is_watched.then(|| FreeByScan { half_width_m: body.radius_m, seen: None });
         let mut drive = Drive::new(plan, mission.robot.rate_hz);
         if let Some(state) = context.saved_state()? {
             drive = state;
