@@ -57,7 +57,7 @@ impl Robot {
         let (tell, truth) = channel();
         std::thread::spawn(move || {
             let mut ticks = lines.map_while(|line| serde_json::from_str(&line).ok());
-            ticks.try_for_each(|tick| tell.send(tick))
+            ticks.all(|tick| tell.send(tick).is_ok())
         });
         Self { process, scheme: "udp://", listening, laser, truth, went: 0.0 }
     }

@@ -4,19 +4,20 @@ use super::*;
 use crate::messages::ImuTurn;
 
 /// Stamp 12.5 s, no orientation, 0.75 rad/s with the variance 0.0004.
-const IMU: [&str; 3] = [
-    "000100000c0000000065cd1d04000000696d7500000000000000000000000000000000007715f3d4eeaacf3fa1ee7d9f5401ef3f000000000000f0bf",
-    "000000000000e83f2d431cebe2363a3f",
-    "2d431cebe2363a3f",
+const IMU: [&[u8]; 3] = [
+    b"\0\x01\0\0\x0c\0\0\0\0e\xcd\x1d\x04\0\0\0imu\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0w\x15\xf3\xd4\xee\xaa\xcf?\xa1\xee}\x9fT\x01\xef?\0\0\0\0\0\0\xf0\xbf",
+    b"\0\0\0\0\0\0\xe8?-C\x1c\xeb\xe26:?",
+    b"-C\x1c\xeb\xe26:?",
 ];
 const GYRO: &str = "robot.rate_hz = 10\nrobot.ros2.imu = '/imu'\n";
 const TURNS: u8 = 3;
 
 fn imu() -> Vec<u8> {
-    let zeros = |count: usize| vec![0; count * 8];
-    let [begin, rate, variance] = IMU.map(bytes);
-    let diagonal = [zeros(3), variance.clone(), zeros(3), variance].concat();
-    [begin, zeros(8), zeros(2), rate, diagonal, zeros(3), zeros(9)].concat()
+    let zeros = [0; 9 * 8];
+    let [begin, rate, variance] = IMU;
+    let zeros = |count: usize| &zeros[..count * 8];
+    let diagonal = [zeros(3), variance, zeros(3), variance].concat();
+    [begin, zeros(8), zeros(2), rate, &diagonal, zeros(3), zeros(9)].concat()
 }
 
 fn imu_at(stamp_us: u64, rate: f64) -> Vec<u8> {

@@ -126,7 +126,7 @@ impl Process for Shell {
         let target = TargetSample::first(mission);
         let is_watched =
             plan.procedure == Procedure::Gyro && mission.front_sonar().kind == SensorKind::Scan;
-        let scan = is_watched.then(|| FreeByScan { half_width_m: body.radius_m, seen: None });
+        let scan = is_watched.then_some(FreeByScan { half_width_m: body.radius_m, seen: None });
         let mut drive = Drive::new(plan, mission.robot.rate_hz);
         if let Some(state) = context.saved_state()? {
             drive = state;

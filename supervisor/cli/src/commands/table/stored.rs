@@ -76,7 +76,6 @@ fn named(tests: &str) -> String {
     tests.split(' ').map(|test| format!("`{test}`")).collect::<Vec<_>>().join(" ")
 }
 
-
 #[cfg(test)]
 mod tests {
     use super::*;
