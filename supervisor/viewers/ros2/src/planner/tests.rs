@@ -329,9 +329,10 @@ const GOALS: [(bool, Release, &[u8]); 4] = [
         b"\0\x01\0\0\x03\x03\x03\x03\x03\x03\x03\x03\x03\x03\x03\x03\x03\x03\x03\x03\x0c\0\0\0\0e\xcd\x1d\x04\0\0\0map\0\x02\0\0\0\x0c\0\0\0\0e\xcd\x1d\x04\0\0\0map\0\0\0\0\0\0\0\0\0\0\0\x14@\0\0\0\0\0\0\x18@\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\xf0?\x0c\0\0\0\0e\xcd\x1d\x04\0\0\0map\0\0\0\0\0\0\0\xf0?\0\0\0\0\0\0\0@\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\xf0?\x0c\0\0\0\0e\xcd\x1d\x04\0\0\0map\0\0\0\0\0\0\0\x1c@\0\0\0\0\0\0 @\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\xf0?\x0a\0\0\0GridBased\0\x01",
     ),
 ];
+type Results = (u16, [Release; 2], [&'static [u8]; 2]);
 /// Results with a path from (1, 2) and without: Nav2's first code, and the oldest and newest
 /// release with it.
-const RESULTS: [(u16, [Release; 2], [&[u8]; 2]); 3] = [
+const RESULTS: [Results; 3] = [
     (
         200,
         [Release::Humble, Release::Common],
