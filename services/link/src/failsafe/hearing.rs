@@ -1,8 +1,7 @@
 //! Detection of sensors that do not hear what is there. "Nothing in range" is also normal in the
 //! open, so something else has to say what a silent sensor should have heard:
 //!
-//! - Earlier [`Echoes`]: a surface that was heard is still there. In 450 missions the sums of missed
-//!   echoes reached 7.9 for one sonar, and 3.2 while all were silent; with deaf sonars 20 to 45.
+//! - Earlier [`Echoes`]: a surface that was heard is still there.
 //! - Infrared rangers beside the front sonar: it must hear a near surface seen on both sides whose
 //!   line of hits is square to its axis.
 //! - Noise: with nothing in reach, infrared rangers still read the end of their scale in a quarter
@@ -24,7 +23,7 @@ use super::echoes::{Echoes, Listener};
 /// Sums of misses of one sonar, and of all: doubted, and surely deaf.
 const ONE: [f64; 2] = [10.0, 16.0];
 const ALL: [f64; 2] = [4.5, 8.0];
-/// Missing end-of-scale readings for doubt and for certainty. Healthy sensors reached 3.7.
+/// Missing end-of-scale readings for doubt and for certainty.
 const ENDS: [f64; 2] = [6.0, 12.0];
 /// Share of a sensor's reach beyond which readings are end-of-scale. Fewer than `LEAST_ENDS` per
 /// frame prove nothing.
@@ -39,6 +38,10 @@ const SPELLS: u32 = 3;
 const NEARER_M: f64 = 0.45;
 const SQUARE_DEG: f64 = 12.0;
 const BESIDE_DEG: f64 = 15.0;
+/// Motion after which a missed echo counts again, metres and radians. From the same pose, the same
+/// echo is missed again.
+const FRESH_M: f64 = 0.03;
+const FRESH_RAD: f64 = 0.05;
 /// Silent readings that may be chance.
 const SILENCES: u32 = 4;
 
@@ -86,6 +89,7 @@ pub(super) struct Hearing {
 #[derive(Clone, Debug, Default)]
 struct Memory {
     echoes: Echoes,
+    robot: Pose2,
     one: BTreeMap<u8, Missing>,
     all: Missing,
     /// Ranges of the rangers beside the front sonar, and its silences since they see a surface.
@@ -134,6 +138,10 @@ impl Hearing {
     pub(super) fn take(&mut self, readings: &[RangeReading], robot: Pose2, at_s: f64) {
         let memory = &mut self.memory;
         memory.echoes.forget(at_s);
+        let turned_rad = (robot.heading - memory.robot.heading).abs();
+        let went_m = robot.position.distance(memory.robot.position);
+        let share = (went_m / FRESH_M + turned_rad / FRESH_RAD).min(1.0);
+        memory.robot = robot;
         let is_silent = readings.iter().all(|it| it.status() != RangeStatus::Measured);
         for reading in readings {
             let Some(sensor) = self.sensors.get(&reading.sensor) else { continue };
@@ -156,7 +164,7 @@ impl Hearing {
                     memory.echoes.hear(listener, reading.range_m, at_s);
                 }
                 RangeStatus::Nothing => {
-                    let likely = memory.echoes.miss(listener);
+                    let likely = share * memory.echoes.miss(listener);
                     missing.add(likely, ONE[1]);
                     if is_silent {
                         memory.all.add(likely, ALL[1]);

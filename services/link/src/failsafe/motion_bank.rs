@@ -60,7 +60,7 @@ impl Hypothesis {
     pub(super) fn words(self, whose: &str) -> String {
         let found = match self {
             Self::Late(by_s) => format!(
-                "are consistent only if they are {by_s} s later than stated; find what delays them, or send their age"
+                "are consistent only if they are {by_s:.1} s later than stated; find what delays them, or send their age"
             ),
             Self::Rolls(0.0) => "do not change although the wheels turn; check the sensor, and whether the wheels slip".to_owned(),
             Self::Rolls(share) => format!(

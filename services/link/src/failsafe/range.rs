@@ -1,11 +1,9 @@
 //! Range monitor: checks that readings change with motion. [`super::hearing`] judges what sensors do
 //! not hear, [`super::range_motion`] and [`super::scan_motion`] whether readings fit the motion.
 //!
-//! A constant reading in motion is stuck. In 240 recorded missions at least [`READINGS`] readings
-//! equal to the centimetre came with at most 0.53 of the required motion. Readings within 7 cm
-//! ([`BANDS_M`]) came with all of it in 3 of 180 others, so the robot slows first. For sensors that
-//! look aside only turns on the spot count, because walls read constant. Readings of nothing are
-//! exempt.
+//! A constant reading in motion is stuck. Readings of some walls stay within the wider of
+//! [`BANDS_M`], so the robot slows first. For sensors that look aside only turns on the spot count,
+//! because walls read constant. Readings of nothing are exempt.
 //!
 //! Readings must also follow from one another while the robot hardly turns. Healthy sensors break
 //! this in up to 0.45 of readings for long, random ones in 0.7 to 0.9. Page's test tells them apart.

@@ -32,16 +32,16 @@ use super::{
 /// `firsthand-lab corpus` prints how often healthy missions reach certainty.
 const ALL: [Row; 12] = [
     (Hypothesis::HEALTHY, [1.0, 1.0]),
-    (Late(0.3), [0.9, 1.6]),
-    (Late(0.5), [1.5, 3.0]),
-    (Late(0.75), [1.5, 3.2]),
-    (Late(1.0), [1.5, 3.2]),
-    (Late(1.25), [1.5, 3.2]),
-    (Late(1.5), [1.6, 3.4]),
-    (Late(2.0), [1.6, 3.6]),
+    (Late(0.3), [1.0, 1.6]),
+    (Late(0.5), [1.9, 3.0]),
+    (Late(0.75), [2.0, 3.2]),
+    (Late(1.0), [2.0, 3.2]),
+    (Late(1.25), [2.0, 3.2]),
+    (Late(1.5), [2.1, 3.4]),
+    (Late(2.0), [2.2, 3.6]),
     (Rolls(0.5), [3.6, 5.5]),
-    (Rolls(0.75), [1.7, 2.6]),
-    (Rolls(1.33), [0.9, 1.4]),
+    (Rolls(0.75), [1.9, 3.0]),
+    (Rolls(1.33), [1.0, 1.6]),
     (Rolls(2.0), [1.9, 3.0]),
 ];
 /// Share of the reach within which hits are reliable.
@@ -213,8 +213,7 @@ impl RangeMotion {
 
     pub(super) fn judged(&self, sure: bool) -> Option<String> {
         let whose = "sonars and infrared rangers";
-        let begun = || Some(self.repeats.likeliest(sure)?.words(whose));
-        self.better.judged(sure, whose).or_else(begun)
+        self.better.judged(sure, whose).or_else(|| self.repeats.judged(sure, whose))
     }
 }
 

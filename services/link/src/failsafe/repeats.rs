@@ -58,11 +58,11 @@ impl Repeats {
         }
     }
 
-    /// Returns the likeliest lag, if it is likely.
-    pub(super) fn likeliest(&self, sure: bool) -> Option<Hypothesis> {
+    pub(super) fn judged(&self, sure: bool, whose: &str) -> Option<String> {
         let lags = self.sums.iter().zip(0_u8..);
         let (sum, lag) = lags.max_by(|one, other| one.0.total_cmp(other.0))?;
-        (*sum >= LIMITS[usize::from(sure)]).then(|| Hypothesis::Late(f64::from(lag) * STEP_S))
+        let words = || Hypothesis::Late(f64::from(lag) * STEP_S).words(whose);
+        (*sum >= LIMITS[usize::from(sure)]).then(words)
     }
 
     /// Returns the greatest evidence of a lag; 1 is sure.

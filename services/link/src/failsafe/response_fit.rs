@@ -33,7 +33,7 @@ const LEAST_M: f64 = 0.04;
 /// Largest unexplained share of judged motion.
 const UNEXPLAINED: f64 = 0.25;
 
-/// Grid of added delay. In 240 recorded missions of robots as stated it found none.
+/// Grid of added delay.
 const LATER_STEP_S: f64 = 0.1;
 const LATER_STEPS: i32 = 20;
 const LEAST_LATER_S: f64 = 0.25;

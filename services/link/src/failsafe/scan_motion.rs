@@ -10,10 +10,13 @@ use std::collections::VecDeque;
 use common::{driver::LaserScan, kinematics::Pose2, mission::Sensor, samples::DoubtsSample};
 use glam::DVec2;
 
-use super::motion_bank::{
-    Bank,
-    Hypothesis::{self, Late, Longer, Rolls, Scaled},
-    Poses, Row,
+use super::{
+    motion_bank::{
+        Bank,
+        Hypothesis::{self, Late, Longer, Rolls, Scaled},
+        Poses, Row,
+    },
+    repeats::Repeats,
 };
 
 /// Hypotheses with their limits: sums in metre-seconds for doubt and for certainty.
@@ -43,6 +46,8 @@ const MOST_APART_S: f64 = 1.0;
 /// Bound on kept scans.
 const MOST_KEPT: usize = 2048;
 const BEAMS: usize = 180;
+/// Beams whose repetitions are judged.
+const REPEATING: usize = 12;
 const LEAST_BEAMS: f64 = 20.0;
 /// Largest difference of one surface, metres.
 const MOST_M: f64 = 0.3;
@@ -60,11 +65,13 @@ pub(super) struct ScanMotion {
     /// Recent scans. The newest is judged once later poses are known.
     scans: VecDeque<(f64, Vec<f32>)>,
     better: Bank<{ ALL.len() }>,
+    repeats: Repeats,
 }
 
 impl ScanMotion {
     pub(super) fn new(row: usize, sensor: Sensor) -> Self {
-        Self { row, sensor, scans: VecDeque::new(), better: Bank::of(&ALL) }
+        let (scans, better) = (VecDeque::new(), Bank::of(&ALL));
+        Self { row, sensor, scans, better, repeats: Repeats::default() }
     }
 
     pub(super) fn reset(&mut self) {
@@ -74,6 +81,10 @@ impl ScanMotion {
     pub(super) fn take(&mut self, scan: &LaserScan, poses: &Poses, at_s: f64) {
         if poses.is_empty() || scan.beams.len() != self.sensor.beams {
             return;
+        }
+        let some = scan.beams.iter().step_by((scan.beams.len() / REPEATING).max(1));
+        for (beam, range) in (0..).zip(some).filter(|(_, range)| range.is_finite()) {
+            self.repeats.take(beam, f64::from(*range), at_s);
         }
         if let Some((newest_s, newest)) = self.scans.back()
             && let Some((first_s, first)) = self.scans.front()
@@ -126,14 +137,16 @@ impl ScanMotion {
 
     pub(super) fn doubt(&self, doubts: &mut DoubtsSample) {
         let is_late = |it| matches!(it, Late(_));
-        doubts.late_scans = doubts.late_scans.max(self.better.doubt(is_late));
+        let late = self.better.doubt(is_late).max(self.repeats.doubt());
+        doubts.late_scans = doubts.late_scans.max(late);
         doubts.frozen_scans = doubts.frozen_scans.max(self.better.doubt(|it| it == Rolls(0.0)));
         let is_scaled = |it| matches!(it, Scaled(_) | Longer(_));
         doubts.scaled_scans = doubts.scaled_scans.max(self.better.doubt(is_scaled));
     }
 
     pub(super) fn judged(&self, sure: bool) -> Option<String> {
-        self.better.judged(sure, &self.sensor.name)
+        let name = &self.sensor.name;
+        self.better.judged(sure, name).or_else(|| self.repeats.judged(sure, name))
     }
 }
 
@@ -161,8 +174,8 @@ mod tests {
             pose = pose.along_arc(0.1 * speed_m_s, turn);
             let laser = sensor.mount.on(pose);
             let beam = |beam: usize| {
-                // Every third beam is 1 % off.
-                let noise = if (beam + tick).is_multiple_of(3) { 1.01 } else { 1.0 };
+                // Noise of 1 % that never repeats.
+                let noise = 1.0 + 0.01 * ((tick * tick + beam) as f64).sin();
                 let bearing = laser.heading + first_rad + beam as f64 * step_rad;
                 (noise * range(laser.position, bearing)) as f32
             };
@@ -179,7 +192,7 @@ mod tests {
     fn scans_that_are_late_or_frozen_are_named_with_their_delay_and_prompt_ones_are_plausible() {
         for speed_m_s in [0.1, 0.4] {
             assert_eq!(said(speed_m_s, |tick| tick), None);
-            for (late, delay) in [(5, "0.5"), (10, "1"), (20, "2")] {
+            for (late, delay) in [(5, "0.5"), (10, "1.0"), (20, "2.0")] {
                 let said = said(speed_m_s, |tick| tick.saturating_sub(late)).unwrap();
                 assert!(said.contains(&format!("they are {delay} s later")), "{said}");
             }
