@@ -123,9 +123,8 @@ impl RangeMotion {
         let is_judged = |it: &&RangeReading| {
             it.status() == RangeStatus::Measured && self.sensors.contains_key(&it.sensor)
         };
-        for reading in readings.iter().filter(is_judged) {
-            self.repeats.take(reading.sensor, reading.range_m, at_s);
-        }
+        let judged = readings.iter().filter(is_judged).map(|it| (it.sensor, it.range_m));
+        self.repeats.take(judged, poses, at_s);
         let counted = [self.robot, poses.at(at_s)];
         self.robot = counted[1];
         for (robot, (hypothesis, _)) in self.robots.iter_mut().zip(ALL) {

@@ -1,17 +1,20 @@
 //! Detection of readings that repeat earlier ones of their sensor.
 //!
 //! A delay that begins cannot show what is yet to come: readings pause, or those of a while ago come
-//! again. Sensors of a moving robot repeat their readings by chance, but not all with the same lag.
-//! Each lag has a sum of log-likelihood ratios, as in Page's test.
+//! again. Sensors of a moving robot repeat their readings by chance, but not all with the same lag,
+//! unless the robot is where it was that time ago. Each lag has a sum of log-likelihood ratios, as in Page's test.
 
 use std::collections::{BTreeMap, VecDeque};
 
-use super::motion_bank::Hypothesis;
+use super::motion_bank::{Hypothesis, Poses};
 
 /// Least change from one reading to the next that shows motion, and tolerance of a repeated one,
 /// metres.
 const CHANGES_M: f64 = 0.012;
 const SAME_M: f64 = 0.005;
+/// Least motion during a lag, metres, and metres per radian of turn.
+const MOVED_M: f64 = 0.03;
+const M_PER_RAD: f64 = 0.3;
 /// Steps of lags, seconds, the least one, and their number. A repetition counts for the two nearest.
 const STEP_S: f64 = 0.15;
 const LEAST_S: f64 = 0.25;
@@ -31,7 +34,25 @@ pub(super) struct Repeats {
 }
 
 impl Repeats {
-    pub(super) fn take(&mut self, sensor: u8, range_m: f64, at_s: f64) {
+    /// Takes sensors with their ranges, metres, and poses by the wheels.
+    pub(super) fn take(
+        &mut self,
+        readings: impl Iterator<Item = (u8, f64)>,
+        poses: &Poses,
+        at_s: f64,
+    ) {
+        let now = poses.at(at_s);
+        let has_moved = std::array::from_fn(|lag| {
+            let then = poses.at(at_s - lag as f64 * STEP_S);
+            let turned_m = M_PER_RAD * (now.heading - then.heading).abs();
+            now.position.distance(then.position) + turned_m > MOVED_M
+        });
+        for (sensor, range_m) in readings {
+            self.take_one(sensor, range_m, at_s, has_moved);
+        }
+    }
+
+    fn take_one(&mut self, sensor: u8, range_m: f64, at_s: f64, has_moved: [bool; LAGS]) {
         let past = self.past.entry(sensor).or_default();
         if past.back().is_some_and(|[_, before_m]| (range_m - before_m).abs() > CHANGES_M) {
             let mut repeats = [false; LAGS];
@@ -43,7 +64,8 @@ impl Repeats {
             // Chance to repeat with any lag.
             let count = repeats.iter().filter(|it| **it).count();
             let chance = (count as f64 / LAGS as f64).min(REPEATED);
-            for (sum, repeats) in self.sums.iter_mut().zip(repeats) {
+            let sums = self.sums.iter_mut().zip(repeats).zip(has_moved);
+            for ((sum, repeats), _) in sums.filter(|(_, has_moved)| *has_moved) {
                 let ratio = match repeats {
                     true => REPEATED / chance,
                     false => (1.0 - REPEATED) / (1.0 - chance),
