@@ -13,7 +13,7 @@ use crate::{
 
 /// Deaf time of a restarted board: its boot loader waits for a program.
 const BOOTS_S: f64 = 1.5;
-/// Time after the last command at which the motors stop.
+/// Since the last command.
 const STOPS_AFTER_MS: u16 = 2000;
 const LONGEST: usize = 64;
 

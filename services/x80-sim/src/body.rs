@@ -52,7 +52,6 @@ impl Body {
         self.pose = pose;
         self.contacts = contacts;
         self.clearance = self.clearance_in(world);
-        // A continuing contact is counted once.
         self.touching = self.clearance <= RELEASE_M;
     }
 

@@ -32,16 +32,13 @@ const MOST_PENDING: usize = 1024;
 pub struct Motor {
     physics: WheelPhysics,
     top_speed: f64,
-    /// Counts per second squared.
     acceleration: f64,
-    /// Counts per second.
     standstill: f64,
     pub enabled: bool,
     order: Option<Order>,
     /// With their times, before the delay.
     pending: VecDeque<(f64, f64)>,
     target: f64,
-    /// Counts per second.
     pub speed: f64,
     pub turned: f64,
     /// Share of stall torque exerted against resistance to wheel or body.

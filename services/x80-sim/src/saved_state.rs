@@ -16,7 +16,6 @@ pub struct SavedState {
     /// Counts of each motor channel since boot.
     pub(crate) turned: [f64; 6],
     pub(crate) contacts: u64,
-    /// Rangers in a run of silence.
     pub(crate) silent: [bool; 6],
     /// Maximum time that a wheel turned after the last motion command.
     pub(crate) stopping_time_s: f64,

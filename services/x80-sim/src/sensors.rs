@@ -107,7 +107,7 @@ impl Ranging {
         ranges.map(|range| sonar::byte(range, physics, noise))
     }
 
-    /// Takes readings. Ultrasonic rangers that have not listened yet do so now.
+    /// Ultrasonic rangers that have not listened yet do so now.
     pub fn measure(
         &mut self,
         world: &World,

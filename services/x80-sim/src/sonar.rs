@@ -28,7 +28,6 @@ pub const REACH_M: f64 = 2.55;
 const HIDES_M: f64 = 0.01;
 /// Offset of a reflected beam from its mirror.
 const NUDGE_M: f64 = 1e-6;
-/// Absorption in air at 40 kHz.
 const ABSORPTION_DB_PER_M: f64 = 1.3;
 const POST_RADIUS_M: f64 = 0.015;
 

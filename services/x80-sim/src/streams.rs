@@ -1,5 +1,3 @@
-//! Running sensor streams, with the frames that each has left.
-
 use common::wire::{Request, Stream};
 
 /// Frames left of the standard, custom and motor stream; none for unlimited. All run from boot.

@@ -1,5 +1,3 @@
-//! Cancellation of a running solve from another thread.
-
 use std::sync::{
     Arc,
     atomic::{AtomicBool, Ordering},

@@ -1,21 +1,17 @@
-//! Cells of a map, and changes to them.
-
 /// Longest side of a map, in cells.
 pub const MAX_SIDE: usize = 16_384;
 
 /// Cell of a map.
-///
-/// Column and row count from 0.
 #[derive(Clone, Copy, Debug, Eq, Hash, Ord, PartialEq, PartialOrd)]
 pub struct Cell {
-    /// Column index.
+    /// Column, from 0.
     pub col: usize,
-    /// Row index.
+    /// Row, from 0.
     pub row: usize,
 }
 
 impl Cell {
-    /// Creates the cell at column `col` of row `row`.
+    /// Creates a cell.
     pub const fn new(col: usize, row: usize) -> Self {
         Self { col, row }
     }

@@ -1,5 +1,3 @@
-//! Map that a field is solved on: blocked cells, target, screening and costs.
-
 use crate::{Cell, Change, MAX_SIDE, MIN_SCREENING_CELLS, Screening, SolveError, real::Real};
 
 /// Map of `width` x `height` cells with its target, screening and costs. Cells outside count as

@@ -240,7 +240,6 @@ fn ring_cells(centre: Place, ring: i64, width: i64, height: i64) -> impl Iterato
         .chain(sides.flat_map(move |c| rows.clone().map(move |r| (c, r))))
 }
 
-/// Returns `vector` + `factor` * `other`.
 pub(crate) fn add_scaled(vector: [f64; 2], factor: f64, other: [f64; 2]) -> [f64; 2] {
     [vector[0] + factor * other[0], vector[1] + factor * other[1]]
 }

@@ -1,5 +1,3 @@
-//! Methods that compute a field.
-
 /// Method that computed a field.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[non_exhaustive]

@@ -1,5 +1,3 @@
-//! Path along the field from a cell to the target.
-
 use crate::{Cell, Field, Guidance, guidance::add_scaled};
 
 const STEP: f64 = 0.25;

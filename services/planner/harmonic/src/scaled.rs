@@ -1,8 +1,4 @@
-//! Non-negative numbers with an `f64` mantissa and a 32-bit exponent.
-
-/// Non-negative number `mantissa` * 2^`exponent`.
-///
-/// The mantissa lies in 1.0 .. 2.0; zero is (0.0, 0).
+/// Non-negative number `mantissa` * 2^`exponent`; zero is (0.0, 0).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Scaled {
     /// Mantissa in 1.0 .. 2.0, or 0.

@@ -15,7 +15,7 @@ pub struct Screening {
 }
 
 impl Screening {
-    /// Creates a screening with `length` in cells; an infinite length means no screening.
+    /// Creates a screening with `length` in cells.
     pub const fn cells(length: f64) -> Self {
         Self { length, cell: 1.0 }
     }

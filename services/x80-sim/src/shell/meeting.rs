@@ -38,7 +38,6 @@ use crate::{
 const PATIENCE: Duration = Duration::from_secs(10);
 /// Interval for resending a pose to a robot that may not listen yet.
 const AGAIN: Duration = Duration::from_millis(20);
-/// Tolerance of equal times.
 const SAME_S: f64 = 1e-6;
 /// Mission time without poses after which the other stands at its last place.
 const FRESH_S: f64 = 0.5;
@@ -108,9 +107,6 @@ pub(super) struct Meeting {
 
 impl Meeting {
     /// Binds the socket `own`; `other` is the other robot's. A readable `stop` ends waits.
-    ///
-    /// # Errors
-    /// Returns an error if it cannot listen.
     pub(super) fn open(
         mission: &Mission,
         [own, other]: [PathBuf; 2],

@@ -106,7 +106,7 @@ fn in_extended_range(u: &mut [Scaled], cells: &[u32], rows: Rows<'_>) {
     }
 }
 
-/// Returns the scalar product, in four partial sums that fit vector registers.
+/// Four partial sums fit vector registers.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let ((a4, a_rest), (b4, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());

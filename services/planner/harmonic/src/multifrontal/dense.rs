@@ -29,7 +29,7 @@ impl Matrix {
         self.ends.extend(1..=pivots);
     }
 
-    /// Adds `value`; row and column may be swapped.
+    /// Row and column may be swapped.
     pub(super) fn add(&mut self, row: usize, column: usize, value: f64) {
         debug_assert!(row.max(column) < self.size);
         let (row, column) = (row.min(column), row.max(column));

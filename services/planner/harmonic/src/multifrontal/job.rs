@@ -3,7 +3,6 @@
 
 use crate::{Cancellation, Domain, SolveError};
 
-/// Map, with the bytes and multiplications allowed for its factorisation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Job<'a> {
     pub domain: &'a Domain,
