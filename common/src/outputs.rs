@@ -40,9 +40,6 @@ struct Replayed {
 
 impl Outputs {
     /// Opens outputs without recorded inputs, which cannot be replayed, and without slices.
-    ///
-    /// # Errors
-    /// If an output cannot be opened.
     pub fn without_inputs(context: &mut Context) -> Result<Self> {
         Self::of_process(context, None, 0)
     }

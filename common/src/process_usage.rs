@@ -24,7 +24,6 @@ pub struct Processes {
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
 impl Processes {
-    /// Shares cover at least a second.
     pub fn look(&mut self, processes: &[u32], now: Instant) -> Vec<Usage> {
         self.seen.retain(|process, _| processes.contains(process));
         processes.iter().map(|&process| self.one(process, now)).collect()

@@ -115,9 +115,6 @@ pub trait Process: Sized {
     };
 
     /// Restores the checkpoint and opens everything except readers.
-    ///
-    /// # Errors
-    /// If one of them cannot be opened.
     fn open(context: &mut Context, readers: Self::Readers) -> Result<Self>;
 
     /// Takes pending inputs, steps and publishes. Called on input and for each heartbeat.
@@ -315,7 +312,6 @@ impl StopRequest {
         self.terminated.came() || self.supervisor.as_ref().is_some_and(ended)
     }
 
-    /// Waits for a request for at most `patience`.
     fn wait(&self, patience: Duration) {
         let mut sources = vec![self.terminated.as_fd()];
         sources.extend(self.supervisor.as_ref().map(AsFd::as_fd));

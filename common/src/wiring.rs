@@ -9,10 +9,9 @@ use crate::{
 
 pub type Topics = &'static [&'static dyn AnyTopic];
 
-/// Additional inputs of every stage's process: fault requests, and the roster with the authorised
-/// processes.
+/// Additional inputs of every stage's process; the roster names the authorised processes.
 pub static EVERY_STAGE_READS: Topics = &[&FAULTS, &ROSTER];
-/// Every stage's process also writes its heartbeats, its trouble, and the inputs of its step.
+/// Additional outputs of every stage's process.
 pub static EVERY_STAGE_WRITES: Topics = &[&HEALTH, &COMPLAINTS, &INPUTS];
 
 /// Topics and persisted state of a stage.

@@ -28,14 +28,13 @@ pub trait AnyTopic: Sync {
     /// With a recorder's buffer, of all generations.
     fn recorder_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>>;
     fn any_writer(&self, bus: &Bus, generation: u32, longest: usize) -> Result<Box<dyn AnyWriter>>;
-    /// Returns the processes that have the topic open.
     fn opened_by(&self, bus: &Bus) -> Result<OpenedBy> {
         ports::opened_by(&bus.medium, self.spec(), &self.carried())
     }
 }
 
 pub trait AnyReader {
-    /// Takes the next sample and returns its author and stamp, if any.
+    /// Takes the next sample.
     fn next_stamp(&mut self) -> Result<Option<(Author, Stamp)>>;
     /// Replaces `message` by the next sample (see [`super::cdr`]) and returns its stamp, if any.
     fn next_message(&mut self, message: &mut Vec<u8>) -> Result<Option<Stamp>>;

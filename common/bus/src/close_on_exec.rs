@@ -14,9 +14,6 @@ use rustix::io::{FdFlags, fcntl_setfd};
 const STANDARD: i32 = 2;
 
 /// Closes all but the standard descriptors in every program that this process executes from now on.
-///
-/// # Errors
-/// If the system fails to list them.
 pub fn close_all_on_exec() -> io::Result<()> {
     for entry in fs::read_dir("/proc/self/fd")? {
         let name = entry?.file_name();

@@ -218,7 +218,6 @@ files! {
     middleware_config: "iceoryx2.toml",
 }
 
-/// Evidence of a supervisor.
 enum Supervision {
     Locked(File),
     Claimed(u32),

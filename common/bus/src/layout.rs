@@ -31,7 +31,6 @@ pub trait Layout: Copy {
 
     fn encode(&self, to: &mut Encoder<'_>);
 
-    /// Decodes the output of [`Layout::encode`].
     fn decode(from: &mut Decoder<'_>) -> Option<Self>;
 
     fn encode_all(items: &[Self], to: &mut Encoder<'_>) {

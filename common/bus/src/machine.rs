@@ -47,7 +47,7 @@ pub type Content = Rc<RefCell<Vec<u8>>>;
 pub struct Files(RefCell<BTreeMap<PathBuf, Content>>);
 
 impl Files {
-    /// Opens a file, which is created empty if it does not exist.
+    /// Creates a missing file, empty.
     pub fn open(&self, path: &Path) -> Content {
         Rc::clone(self.0.borrow_mut().entry(path.to_path_buf()).or_default())
     }

@@ -62,9 +62,7 @@ fn not_running(domain: &Domain) -> impl Fn(io::Error) -> BusError {
 impl Bus {
     /// Creates a robot's bus: its configuration, which consumers in all languages load, and the
     /// services of all topics in `table`.
-    ///
-    /// It replaces an earlier bus, and can be joined only once all services exist. Only the
-    /// supervisor calls this.
+    /// It replaces an earlier bus, and can be joined only once all services exist.
     pub fn make(domain: &Domain, name: &str, table: &[&dyn AnyTopic]) -> Result<(Self, Services)> {
         let failed = no_join(domain);
         let instance = BusInstance::new(domain);

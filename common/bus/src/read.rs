@@ -108,7 +108,7 @@ impl<H: Stamped, E: Payload> Reader<H, E> {
         Ok(None)
     }
 
-    /// Includes all generations. Samples of an older one may arrive after the first of the next.
+    /// Samples of an older generation may arrive after the first of the next.
     pub fn of_all_generations(mut self) -> Self {
         self.admitted = self.admitted.of_all_generations();
         self
@@ -155,7 +155,6 @@ impl Wakeup {
         Ok(self.had_events.get() && self.drain()?)
     }
 
-    /// Returns whether an event waits, on a simulated machine.
     pub(crate) fn is_woken(&self) -> bool {
         self.listener.is_woken()
     }

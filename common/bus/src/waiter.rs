@@ -13,7 +13,6 @@ use crate::{
     read::Wakeup,
 };
 
-/// Set of wakeups and other descriptors to wait for.
 #[derive(Debug, Default)]
 pub struct Waiter {
     wakeups: Vec<Wakeup>,

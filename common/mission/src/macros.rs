@@ -49,7 +49,6 @@ macro_rules! wire_enum {
         #[repr(u8)]
         pub enum $name { $($(#[$doc])* $variant = $byte),* }
         impl $name {
-            /// Names of all values and their bytes.
             pub const VALUES: &[(&str, u8)] = &[$((stringify!($variant), $byte)),*];
 
             /// Decodes a byte; an unknown one gives the safe value.

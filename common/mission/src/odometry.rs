@@ -95,8 +95,6 @@ struct Calibrated {
 }
 
 impl Calibration {
-    /// # Errors
-    /// If a value cannot be written as TOML.
     pub fn text(odometry: Odometry) -> Result<String, toml::ser::Error> {
         toml::to_string(&Self { robot: Calibrated { odometry } })
     }

@@ -27,7 +27,6 @@ pub fn counts_between(old: u16, new: u16) -> i32 {
     between
 }
 
-/// DID 123.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MotorSensors {
     /// AD counts of the six channels, like `currents`.
@@ -37,7 +36,6 @@ pub struct MotorSensors {
     pub encoders: [Encoder; 2],
 }
 
-/// DID 125.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StandardSensors {
     /// Each is an [`super::Echo`].
@@ -64,7 +62,6 @@ pub struct StandardSensors {
     pub reference: u16,
 }
 
-/// DID 124.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CustomSensors {
     /// Infrared rangers 2 to 7 are on channels 2 to 7.
