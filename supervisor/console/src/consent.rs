@@ -1,5 +1,3 @@
-//! Questions to a person.
-
 use std::io::{self, IsTerminal as _};
 
 use super::{failure::Result, output::write_stderr};

@@ -42,7 +42,6 @@ pub struct Report {
     pub rate_hz: f64,
     /// Longest gap within a process, or since the last sample.
     pub longest_gap_s: Option<f64>,
-    /// Time since the last sample.
     pub age_s: Option<f64>,
     /// Samples overwritten before this reader took them.
     pub lost: u64,

@@ -33,7 +33,6 @@ impl Stream {
         Self::with_usual_priority()
     }
 
-    /// Opens like [`Self::open`], without the lower priority.
     pub fn with_usual_priority() -> io::Result<Self> {
         Ok(Self { signals: Signals::that_end()?, ended: false })
     }

@@ -34,7 +34,6 @@ pub(crate) struct BusEndpoints {
     pub orders: Writer<RequestSample>,
     pub requests: Reader<RequestSample>,
     pub beacon: Reader<BeaconSample>,
-    /// Time of the newest publication of the state.
     pub published: Option<Instant>,
     /// A consumer is new since the last publication.
     pub misses_trouble: bool,

@@ -73,7 +73,7 @@ pub(crate) fn touched([x, y]: [f64; 2]) -> Ending {
     Ending::failed(Outcome::Collision, reason)
 }
 
-/// Deadline of a target. Operators' stops do not count.
+/// Operators' stops do not count.
 #[derive(Clone, Copy)]
 pub(crate) struct Deadline {
     pub began_s: f64,

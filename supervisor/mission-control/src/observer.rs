@@ -86,8 +86,6 @@ pub struct Record {
 }
 
 impl Observer {
-    /// Opens all readers on `bus`.
-    ///
     /// `waiter` wakes for heartbeats, fields and link samples, which end a tick, and leaves the
     /// processor to the stages during a tick.
     pub(crate) fn new(bus: &Bus, waiter: &mut Waiter) -> Result<Self, BusError> {
@@ -109,7 +107,7 @@ impl Observer {
         })
     }
 
-    /// Reads all new samples into `record`. Returns whether they changed the roster.
+    /// Returns whether new samples changed the roster.
     pub(crate) fn read_all(
         &mut self,
         record: &mut Record,

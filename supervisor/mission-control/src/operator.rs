@@ -415,8 +415,6 @@ fn refused(robot: &RobotName, answer: RequestAnswer) -> OperatorError {
     Refused::new(code(answer), message).into()
 }
 
-/// Refuses an order to a mirror.
-///
 /// # Errors
 /// Fails if `domain` is a mirror; the order belongs on the robot's machine.
 pub fn refuse_mirror(domain: &Domain) -> Result {

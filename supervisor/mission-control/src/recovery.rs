@@ -54,12 +54,12 @@ impl SupervisorState {
     }
 }
 
-/// Returns the summary of the run in `directory`; `None` without a readable one.
+/// Returns `None` without a readable summary.
 pub fn summary<T: DeserializeOwned>(directory: &Path) -> Option<T> {
     serde_json::from_str(&file::text(&directory.join(SUMMARY), LARGEST_SUMMARY)?).ok()
 }
 
-/// Returns the last known place of the robot of the run in `directory`, and its age, seconds.
+/// Returns the robot's last known place and its age, seconds.
 pub fn last_place(directory: &Path, mission: &Mission) -> Option<(PlaceSample, f64)> {
     let place = saved_place(directory, mission).ok().flatten()?;
     let saved =

@@ -87,7 +87,7 @@ impl Supervisor<'_> {
         RequestAnswer::Taken
     }
 
-    /// Sets the robot's place. Dead reckoning takes it with the next tick, which resets the map.
+    /// Dead reckoning takes the place with the next tick, which resets the map.
     fn place_robot(&mut self, request: &RequestSample) -> RequestAnswer {
         let Some([point]) = request.targets() else { return RequestAnswer::Malformed };
         let [sigma_m, sigma_rad] = request.deviations;
@@ -178,7 +178,7 @@ impl Supervisor<'_> {
         self.on_new_target();
     }
 
-    /// Moves the target ahead over free ground. The planner leads there as to any target.
+    /// Moves the target ahead over free ground.
     fn drive_by_hand(&mut self, request: &RequestSample, first_tick: u64) -> RequestAnswer {
         let mission = &self.options.mission;
         if !mission.stay {

@@ -97,8 +97,6 @@ impl Consumer for () {}
 
 pub(crate) const CAUGHT_UP_EVERY: u64 = 32;
 
-/// Carries out a run.
-///
 /// `listener` receives the samples that the run reads. `show` is called a few times a second. The
 /// robot's files stay until `lock` is dropped, after the consumers.
 pub fn run<'a>(
@@ -120,7 +118,7 @@ pub fn run<'a>(
     Ok((finished, moving.map(|supervisor| StillMoving { supervisor, signals })))
 }
 
-/// Conducts a run to its result. Returns the supervisor of a robot that still moves.
+/// Returns the supervisor of a robot that still moves.
 pub(crate) fn conduct<'a>(
     options: &'a Options,
     surroundings: &mut dyn Surroundings,
@@ -191,7 +189,7 @@ pub(crate) fn conduct<'a>(
     Ok((finished, (wheels == Wheels::Turning).then_some(supervisor)))
 }
 
-/// Conducts a run on a simulated machine. `listener` receives the samples that it reads.
+/// Conducts a run on a simulated machine.
 pub fn simulate(
     options: &Options,
     surroundings: &mut dyn Surroundings,

@@ -63,11 +63,8 @@ struct GroundTruth {
 }
 
 impl Simulator {
-    /// Starts the simulator of `robot` in the world of `mission`. Returns once it listens, or
-    /// `given_up` is readable.
-    ///
-    /// `firsthand` starts that executable. The simulator continues from an earlier one's checkpoint
-    /// in `directory`.
+    /// Returns once the simulator listens, or `given_up` is readable. It runs the executable
+    /// `firsthand`, and continues from an earlier one's checkpoint in `directory`.
     pub fn start(
         mut firsthand: Command,
         robot: Option<&RobotName>,

@@ -16,7 +16,7 @@ use crate::{
 };
 
 impl Supervisor<'_> {
-    /// Detects stalls and takes the next recovery step. The last one ends the mission.
+    /// The last recovery step ends the mission.
     pub(crate) fn watch_for_stalls(&mut self) -> Result<Option<Ending>> {
         if self.decision.order() != Order::Drive {
             // In lockstep mission time stands still meanwhile.
@@ -99,10 +99,8 @@ impl Supervisor<'_> {
         Some((stall.stamp.tick, Ending::failed(Outcome::Unreachable, reason)))
     }
 
-    /// Returns the tick and ending of the stall without a remaining recovery step.
-    ///
-    /// In lockstep, checks the ticks that the loop left unchecked; their number depends on the
-    /// machine.
+    /// Like [`Self::given_up`], and in lockstep checks the ticks that the loop left unchecked;
+    /// their number depends on the machine.
     pub(crate) fn end_by_stall(&mut self) -> Option<(u64, Ending)> {
         while self.clock.in_ticks()
             && self.stall_watch.gave_up().is_none()

@@ -26,7 +26,6 @@ use crate::{
 
 /// A simulated robot, as its supervisor sees it.
 pub trait SimulatedRobot {
-    /// Returns the ground truth so far.
     fn truth(&self) -> &[GroundTruthTick];
 
     /// Reads new ground truth. Returns whether the robot still runs.
@@ -69,17 +68,15 @@ pub trait Surroundings {
     /// Returns the bus, with the services of all topics.
     fn bus(&self) -> Result<Rc<Bus>>;
 
-    /// Replaces the bus.
     fn recreate_bus(&mut self) -> Result;
 
     fn host(&self, options: &Options) -> Box<dyn Host>;
 
     fn start_robot(&mut self, options: &Options) -> Result<Robot>;
 
-    /// Returns whether the run is asked to end.
     fn is_asked_to_end(&self) -> bool;
 
-    /// Returns whether the run is asked to end, and answers the request.
+    /// Also answers the request.
     fn take_request_to_end(&mut self) -> bool;
 
     /// Returns what becomes readable when the run is asked to end.
@@ -102,7 +99,6 @@ pub trait Surroundings {
     fn restore(&mut self) {}
 }
 
-/// Surroundings of a real run.
 pub(crate) struct Real<'a> {
     pub domain: Domain,
     pub lock: &'a mut DomainLock,

@@ -305,8 +305,7 @@ impl TargetList {
         }
     }
 
-    /// Returns all results of a run that ended with `ending` after `last_tick`, with the final
-    /// ground truth `ended`.
+    /// Returns all results of a run; `ended` is the final ground truth.
     pub(crate) fn results(
         &self,
         ending: &Ending,

@@ -1,5 +1,3 @@
-//! Descriptor limit of this process.
-
 use std::fs;
 
 use rustix::process::{Resource, Rlimit, setrlimit};

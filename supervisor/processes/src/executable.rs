@@ -1,5 +1,3 @@
-//! Lookup and check of a named executable before any start.
-
 use std::{
     env, io,
     path::{Path, PathBuf},

@@ -17,7 +17,6 @@ use crate::{
     process::{self, ExitCause, Process},
 };
 
-/// A process that is watched.
 pub trait Watched {
     fn id(&self) -> u32;
 

@@ -24,9 +24,6 @@ pub struct PlannerExecutableError {
 }
 
 /// Makes the `planner.executable` of `mission` absolute, unless it is one of the `others`.
-///
-/// # Errors
-/// Fails if it cannot be executed.
 pub fn resolve(
     mission: &mut Mission,
     others: &'static [&'static str],
@@ -38,9 +35,6 @@ pub fn resolve(
 }
 
 /// Returns the planner among `others` that is `named`, or the executable's absolute path.
-///
-/// # Errors
-/// Fails if it cannot be executed.
 pub fn find_planner(
     named: &Path,
     others: &'static [&'static str],

@@ -30,7 +30,7 @@ pub struct StageProcessError {
     source: io::Error,
 }
 
-/// Stage and its current generation. Times are of the owner's clock.
+/// Times are of the owner's clock.
 pub(crate) struct StageProcess {
     pub stage: &'static Stage,
     executable: Option<PathBuf>,

@@ -39,9 +39,6 @@ impl Bag {
     }
 
     /// Adds a topic. Late joiners get its newest message if it `is_latched`.
-    ///
-    /// # Errors
-    /// Fails if the file cannot be written.
     pub fn add(&mut self, [topic, kind, definition]: [&str; 3], is_latched: bool) -> Result {
         let quality = if is_latched { LATCHED } else { "" };
         let about = [("offered_qos_profiles", quality)];
@@ -49,17 +46,11 @@ impl Bag {
     }
 
     /// Adds a CDR message with its encapsulation.
-    ///
-    /// # Errors
-    /// Fails if the file cannot be written.
     pub fn message(&mut self, topic: &str, at_ns: u64, message: &[u8]) -> Result {
         self.output.write(topic, 0, [at_ns; 2], message)
     }
 
     /// Writes the rest. Returns the count of messages.
-    ///
-    /// # Errors
-    /// Fails if the files cannot be written.
     pub fn finish(self) -> Result<u64> {
         let summary = self.output.finish()?;
         let stats = summary.stats.unwrap_or_default();

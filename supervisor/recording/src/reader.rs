@@ -61,7 +61,7 @@ pub struct Message {
     pub topic: Arc<str>,
     /// Mission time, as nanoseconds since 1970.
     pub log_ns: u64,
-    /// Number of the sample, counted by its writer.
+    /// Counted by its writer.
     pub sequence: u32,
     pub data: Vec<u8>,
 }

@@ -247,7 +247,6 @@ impl Tape {
         Ok(())
     }
 
-    /// Takes all samples.
     pub fn take(&mut self) -> Result {
         let directory = self.options.run.clone().unwrap_or_default();
         if self.current.is_none() && file::exists(&directory.join(run::FILE_NAME)) {

@@ -1,8 +1,7 @@
 //! Replay of every generation of every stage in a recording, from its checkpoint, through the same
 //! step, with the recorded inputs. Outputs are compared with the recorded ones to the bit.
 //!
-//! A generation's state follows from all its inputs, so it is replayed only from its beginning. The
-//! report explains why a generation was not replayed.
+//! A generation's state follows from all its inputs, so it is replayed only from its beginning.
 
 pub mod diff;
 pub mod driver;

@@ -12,7 +12,7 @@ use common::{
 
 #[derive(Debug)]
 pub struct Schema {
-    /// Schema name, for example `firsthand/msg/Pose`.
+    /// For example `firsthand/msg/Pose`.
     pub name: String,
     /// Fields of the message, then the nested messages.
     pub text: String,

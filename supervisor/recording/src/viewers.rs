@@ -40,7 +40,7 @@ static DRAWN: [&dyn AnyTopic; 5] =
 #[derive(Debug)]
 pub struct Channel {
     pub topic: String,
-    /// Schema name, such as `foxglove.Grid`.
+    /// Such as `foxglove.Grid`.
     pub schema: &'static str,
     /// Schema as a `FileDescriptorSet`.
     pub descriptors: &'static [u8],

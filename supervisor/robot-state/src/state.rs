@@ -1,5 +1,3 @@
-//! State of a robot: its newest samples.
-
 use std::collections::BTreeMap;
 
 use common::{

@@ -87,7 +87,7 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     Ok(u8::from(is_ill).into())
 }
 
-/// Returns the output of `command`; `None` if it does not start.
+/// `None` if it does not start.
 fn printed(command: &mut Command) -> Option<String> {
     let output = command.output().ok()?;
     Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())

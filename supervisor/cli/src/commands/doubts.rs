@@ -31,7 +31,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Width of a course, columns.
+/// Of a course.
 const COLUMNS: usize = 40;
 const LEVELS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 

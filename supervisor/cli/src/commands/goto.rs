@@ -73,7 +73,6 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     }
 }
 
-/// Waits for the result of `target` among the next `results` of `run`.
 fn await_result(
     robot: &RobotName,
     run: &Path,

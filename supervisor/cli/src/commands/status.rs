@@ -69,7 +69,7 @@ struct Status<'a> {
     pose: Option<PoseStatus>,
     link: Option<LinkStatus>,
     power: Option<PowerStatus>,
-    /// The trouble of a stage; none if no stage has any.
+    /// None if no stage has trouble.
     complaint: Option<ComplaintStatus<'a>>,
     stages: Vec<StageStatus<'a>>,
 }
@@ -95,7 +95,7 @@ struct TargetStatus {
     last: u64,
     x_m: f64,
     y_m: f64,
-    /// Distance to the target. `None` without a pose.
+    /// `None` without a pose.
     to_go_m: Option<f64>,
 }
 
@@ -107,7 +107,6 @@ struct FollowingStatus {
     distance_m: f64,
     used: u64,
     refused: u64,
-    /// Reason of the newest refusal.
     refusal: Option<&'static str>,
     result: String,
 }
@@ -129,7 +128,7 @@ struct LinkStatus {
     robot: &'static str,
     /// Cause of the effect. `None` while the robot goes.
     cause: Option<&'static str>,
-    /// Whether all wheels are at rest by the encoders.
+    /// By the encoders.
     at_rest: bool,
     /// Time since the robot's last answer. `None` while it answers.
     lost_s: Option<f64>,
@@ -278,7 +277,7 @@ fn follow(arguments: &Arguments) -> Result {
     Ok(())
 }
 
-/// Returns the status of `robot`; `None` if incomplete.
+/// Returns `None` if incomplete.
 fn status<'a>(
     arguments: &'a Arguments,
     robot: &'a RobotState,

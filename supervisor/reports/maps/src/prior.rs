@@ -48,9 +48,6 @@ fn known(file: &Path, placed: &PlacedMap, frame: &GridFrame) -> Result<Vec<Box2>
 ///
 /// Grid hazards extend a surface by the body's reach. The map has only surfaces: cells with only
 /// hazard within that reach. A mission from the map then has the same hazards.
-///
-/// # Errors
-/// A file cannot be written.
 pub fn save_believed(
     file: &Path,
     mission: &Mission,

@@ -39,7 +39,6 @@ pub fn load_placed(file: &Path) -> Result<PlacedMap, MapError> {
     placed(file, image::load)
 }
 
-/// Loads a map that blocks only occupied cells.
 pub(super) fn load_occupied(file: &Path) -> Result<PlacedMap, MapError> {
     placed(file, |image, lightness| {
         image::pixels(image, Lightness { free_thresh: f64::INFINITY, ..lightness })

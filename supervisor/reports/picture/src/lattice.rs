@@ -1,5 +1,3 @@
-//! Cells of a map on the page.
-
 use common::grid::GridFrame;
 use glam::DVec2;
 

@@ -1,5 +1,3 @@
-//! Legend, which explains every symbol of the plot.
-
 use common::geometry::Shapes;
 use glam::DVec2;
 

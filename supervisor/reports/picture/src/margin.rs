@@ -1,5 +1,3 @@
-//! Parts around the plot: title, axes, captions.
-
 use glam::DVec2;
 
 use super::{

@@ -1,5 +1,3 @@
-//! Trajectories, the robot's body at regular times, start, target, end.
-
 use common::{geometry::principal_axes, kinematics::Pose2};
 use glam::DVec2;
 

@@ -1,5 +1,3 @@
-//! Points in the plane, such as the ends of beams.
-
 use glam::DVec2;
 
 use super::{

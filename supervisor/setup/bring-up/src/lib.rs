@@ -1,7 +1,6 @@
 //! Bring-up: a comparison of a new robot's behaviour with its mission.
 //!
-//! The planner stage of [`calibration`] lets the robot stand, turn on the spot to both sides, drive
-//! a short distance there and back, and turn to and fro. [`findings`] compares its recorded
+//! The planner stage of [`calibration`] drives the procedure. [`findings`] compares its recorded
 //! [`Trace`] with the mission. Each [`Finding`] is a verdict about one part, with the mission keys
 //! to change or the part to repair.
 //!

@@ -62,7 +62,6 @@ impl Seen {
         self.ticks.0 > 0 || !self.words.is_empty()
     }
 
-    /// Takes `bytes` that came at `at_s`.
     pub fn hear(&mut self, bytes: &[u8], at_s: f64) {
         if self.protocol == Protocol::Json {
             for line in self.lines.push(bytes) {

@@ -34,7 +34,6 @@ pub struct Trace {
     pub scans: Vec<Scan>,
 }
 
-/// Time, header and ranges.
 pub type Scan = (f64, ScanHeader, Vec<f32>);
 
 /// Stretch of time with one command.
@@ -73,9 +72,6 @@ impl Told {
 
 impl Trace {
     /// Reads `recording` with the sizes stated by `mission`.
-    ///
-    /// # Errors
-    /// Fails if the recording cannot be read.
     pub fn read(mission: &Mission, recording: &Recording) -> Result<Self, RecordingError> {
         let body = mission.body();
         let scales = mission.robot.odometry.wheel_scales();

@@ -39,9 +39,6 @@ pub enum Drive {
 impl Drive {
     /// Reads the procedure that the run in `directory` saved in its last tick. A recording may lack
     /// ticks.
-    ///
-    /// # Errors
-    /// Fails if the checkpoint cannot be read.
     pub fn of_run(directory: &Path) -> Result<Option<Self>, CheckpointError> {
         let file = run::checkpoint_file(directory, Shell::NAME);
         Ok(Checkpoint::open(&file, STATE_BYTES)?.1)

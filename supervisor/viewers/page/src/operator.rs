@@ -13,7 +13,6 @@ use crate::orders::Order;
 
 const IS_SENT: &str = "the supervisor sends the robot there";
 
-/// Returns the confirmation, or the reason for a failure.
 pub fn perform(robot: &RobotName, order: &Order) -> Result<String, String> {
     confirmed(robot, order).map_err(|error| error.to_string())
 }

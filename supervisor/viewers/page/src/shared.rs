@@ -24,7 +24,6 @@ pub struct Newest<T> {
 }
 
 impl<T: Clone> Newest<T> {
-    /// Takes a newer value, if there is one.
     pub fn update(&mut self, newer: Option<T>) {
         if newer.is_some() {
             (self.number, self.value) = (self.number + 1, newer);

@@ -144,7 +144,7 @@ pub fn serve(arguments: &Arguments) -> Result {
     Ok(())
 }
 
-/// Updates `told`. Returns the number of the run.
+/// Returns the number of the run.
 fn tell(
     told: &mut Told,
     domain: &Domain,

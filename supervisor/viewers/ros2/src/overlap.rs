@@ -9,7 +9,6 @@ use ros2::topic::Topic;
 
 use crate::{endpoints::published, topics::Id};
 
-/// Returns the topics of a bridge in `domain` and `namespace` that the link of `run` reads.
 pub fn overlap<'a>(
     (domain, namespace): (u16, &str),
     run: &Run,

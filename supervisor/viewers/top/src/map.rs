@@ -50,7 +50,6 @@ const fn hazard(state: CellState) -> Option<Color> {
     }
 }
 
-/// Returns the signs of hazards with their meanings.
 pub fn legend() -> [(char, Style, &'static str); 4] {
     let hazards = [
         (CellState::Sensed, "sensed"),

@@ -23,7 +23,6 @@ use console::{
 
 use crate::commands::run::recorder::RunRecorder;
 
-/// Outcome of a procedure that was driven to its end.
 const COMPLETED: &str = "completed";
 
 /// Options that every calibration procedure takes.
@@ -87,7 +86,7 @@ impl Setting {
         Ok(mission)
     }
 
-    /// Drives the procedure. Fails if it does not complete.
+    /// Fails if the procedure does not complete.
     pub fn carry_out(&self, mission: &Mission, title: &str) -> Result<Carried> {
         // Applies the checks of a handwritten mission.
         let mission = missions::parsed(&toml::to_string(mission)?, &mission.name, &[])?;

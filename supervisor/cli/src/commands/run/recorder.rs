@@ -13,8 +13,8 @@ use processes::process::{Process, firsthand};
 
 use crate::commands::record::DiskBudget;
 
-/// Returns the wait times, milliseconds, until the recorder has attached, caught up and ended. It needs milliseconds, or seconds beside 30 busy processes per
-/// core.
+/// Returns the waits for the recorder to attach, catch up and end, milliseconds. The recorder needs
+/// milliseconds, or seconds beside 30 busy processes per core.
 ///
 /// Short for a real robot, long for a simulated one, and for a calibration, which needs its
 /// recording.

@@ -21,7 +21,6 @@ const RUN_ROOM: u64 = 2 << 20;
 /// Bytes per cell in the mapper's checkpoint.
 const CELL_ROOM: u64 = 16;
 
-/// For a map of `cells`.
 pub const fn room_of_run(cells: usize) -> u64 {
     RUN_ROOM + CELL_ROOM * cells as u64
 }

@@ -50,7 +50,7 @@ fn table_header(columns: &[&str]) -> String {
     format!("| {} |\n|{}\n", columns.join(" | "), "---|".repeat(columns.len()))
 }
 
-/// Returns a row of the file called `name`: an item of a list, or a row of a table.
+/// Returns an item of a list, or a row of a table.
 fn line(name: &str, row: &[&str]) -> String {
     match (name, row) {
         ("capabilities", [text, verdict, ""]) => item(&format!("{verdict}: {text}")),

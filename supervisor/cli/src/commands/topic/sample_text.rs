@@ -23,7 +23,6 @@ pub fn json(fields: Fields) -> serde_json::Result<String> {
 
 pub type Fields = Vec<(&'static str, Value)>;
 
-/// Returns the header's fields, and the slice's elements.
 pub fn fields(header: Value, elements: Option<Vec<Value>>) -> Fields {
     let mut fields = match header {
         Value::Struct(fields) => fields,
