@@ -192,7 +192,7 @@ impl Job<'_> {
     }
 }
 
-/// Sends a robot to another target. Returns whether it took it.
+/// Returns whether the robot took the target.
 fn send(robot: &str, place: [f64; 2]) -> bool {
     let [x, y] = place.map(|it| it.to_string());
     let sent = robot::firsthand(&["goto", "--robot", robot, &x, &y]).output();
@@ -211,7 +211,7 @@ fn numbers(summary: &str) -> Result<Map<String, Value>> {
 /// What came of a mission, besides its recording.
 struct Way {
     summary: Map<String, Value>,
-    /// Ground truth, a line for each tick.
+    /// A line for each tick.
     truth: Vec<String>,
 }
 

@@ -264,7 +264,6 @@ fn drive(seed: u64, number: u64) -> Result<(&'static str, Healthy)> {
     Ok((robot, healthy.map_err(|it| format!("{robot}, {}: {it}", scenario.mission.name))?))
 }
 
-/// Draws a robot and its mission.
 fn draw(seed: u64, number: u64) -> Result<(&'static str, Scenario)> {
     let random = &mut Random::of_world(seed, STREAM, number);
     let (robot, keys) = ROBOTS[random.below(ROBOTS.len())];

@@ -65,7 +65,6 @@ enum Bench {
     Sources(sources::Arguments),
 }
 
-/// Reads a CSV table.
 fn rows<T: DeserializeOwned>(table: impl Read) -> csv::Result<Vec<T>> {
     csv::Reader::from_reader(table).into_deserialize().collect()
 }

@@ -22,9 +22,6 @@ use summary::Summary;
 use crate::error::{OrCannot as _, Result, refuse};
 
 /// Returns the path of `firsthand`, beside this executable or on `PATH`.
-///
-/// # Errors
-/// It is at neither place.
 pub fn path() -> Result<PathBuf> {
     executable::find(Path::new("firsthand")).or_else(|problem| {
         let build = "build it with `cargo build --release`";
@@ -85,8 +82,6 @@ impl Run {
         Ok(self)
     }
 
-    /// Returns the run's summary.
-    ///
     /// # Errors
     /// Without a summary, the last line of the run's standard error.
     pub fn summary(&self) -> Result<Summary> {

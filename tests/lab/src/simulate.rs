@@ -54,7 +54,6 @@ pub struct Arguments {
     set: Vec<String>,
 }
 
-/// Totals of all runs.
 #[derive(Default)]
 struct Totals {
     broken: u64,
@@ -157,7 +156,7 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if totals.broken == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Runs `scenario`; records and replays it if asked.
+/// Records and replays the run if asked.
 fn run(scenario: &Scenario, arguments: &Arguments) -> Result<Ran> {
     if arguments.out.is_none() && !arguments.replay {
         return Ok(scenario.run());
@@ -184,7 +183,6 @@ pub fn observe<T: Observer + 'static>(scenario: &Scenario, observer: T) -> (Ran,
     (ran, Rc::into_inner(observer).map(RefCell::into_inner))
 }
 
-/// Runs `scenario` and records it in `out`.
 pub fn record(scenario: &Scenario, out: &Path) -> Result<Ran> {
     let tape = Tape::new(&Scenario::robot(), Scenario::directory(), out.to_path_buf());
     let (ran, recorder) = observe(scenario, Recorder { tape, failed: Ok(()) });

@@ -33,7 +33,7 @@ enum Compared {
     Not,
 }
 
-/// Returns how a topic is compared. A new topic is compared to the byte.
+/// A new topic is compared to the byte.
 fn compared(topic: &dyn AnyTopic) -> Compared {
     match topic.spec().name {
         "grid" => Compared::Map,
@@ -53,7 +53,7 @@ fn compared(topic: &dyn AnyTopic) -> Compared {
     }
 }
 
-/// Samples of each topic.
+/// By topic.
 type Samples = BTreeMap<String, Vec<Vec<u8>>>;
 
 /// Returns the first difference of two recordings in the first `ticks` ticks, in the order of the

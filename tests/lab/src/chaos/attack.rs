@@ -29,9 +29,8 @@ use super::{
 use crate::error::{OrCannot as _, Result};
 
 const POLL: Duration = Duration::from_millis(50);
-/// Maximum signals to a stage within the hold rule's window: a stage that dies more often is held
-/// until an operator releases it. A second signal may follow at start-up, and each may be counted
-/// late.
+/// Maximum signals to a stage within the hold rule's window, after which a stage is held. A second
+/// signal may follow at start-up, and each may be counted late.
 const MOST_HITS: usize = HOLD_AFTER - 4;
 
 #[derive(Default)]

@@ -87,10 +87,8 @@ impl Consumers {
         Ok(())
     }
 
-    /// Kills and restarts the consumer at `index`, or freezes it for `pause`.
-    ///
-    /// Returns its name and number of starts. Returns `None` without a signal: it is already
-    /// frozen, or had ended by itself and is restarted.
+    /// Returns the consumer's name and number of starts; `None` without a signal, because it is
+    /// frozen already, or had ended by itself and is restarted.
     pub fn hit(
         &mut self,
         index: usize,

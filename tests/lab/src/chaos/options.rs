@@ -80,10 +80,8 @@ pub struct Options {
 }
 
 impl Options {
-    /// Creates the options and a new directory for the missions.
-    ///
-    /// # Errors
-    /// Fails for an unsuitable mission or conflicting options.
+    /// Creates a new directory for the missions. Fails for an unsuitable mission or conflicting
+    /// options.
     pub fn of(asked: &Arguments) -> Result<Self> {
         let mut asked = asked.clone();
         if asked.freeze_all {

@@ -128,7 +128,7 @@ fn quantiles<S: Serializer>(histogram: &Histogram, to: S) -> Result<S::Ok, S::Er
     to.collect_seq(us.map(|us| rounded(us / 1e3)))
 }
 
-/// Signal; unmeasured values are empty cells.
+/// Signal; unmeasured values are empty cells. Delays count from the signal.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Row {
     pub mission: u64,
@@ -141,13 +141,11 @@ pub struct Row {
     pub generation: Option<u32>,
     /// Whether the hit was due in the process's first milliseconds.
     pub start_up: bool,
-    /// Time from the signal until the record of the death was read; only for stages.
+    /// Until the record of the death was read; only for stages.
     pub noticed_ms: Option<f64>,
-    /// Time from the signal until the successor's first sign of work; only for stages and the
-    /// supervisor.
+    /// Until the successor's first sign of work; only for stages and the supervisor.
     pub ready_ms: Option<f64>,
-    /// Time from the signal until the successor's first sample of a tick; only for stages and the
-    /// supervisor.
+    /// Until the successor's first sample of a tick; only for stages and the supervisor.
     pub first_output_ms: Option<f64>,
 }
 

@@ -128,7 +128,6 @@ fn off_m(mission: &Mission, truth: &[GroundTruthTick]) -> Option<f64> {
     Some((last.x - mission.target.x).hypot(last.y - mission.target.y))
 }
 
-/// A robot without a fault.
 struct Healthy {
     scenario: Scenario,
     departed_s: Option<f64>,

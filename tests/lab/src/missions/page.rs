@@ -1,5 +1,3 @@
-//! Page of results.
-
 use std::path::Path;
 
 use console::output::write_stderr;

@@ -24,7 +24,7 @@ pub enum Outcome {
 pub const OUTCOMES: [&str; 6] =
     ["success", "collision", "timeout", "wrong_place", "unreachable", "aborted"];
 
-/// Lengths are metres, times mission seconds. Latencies differ in every run and are in [`Latency`].
+/// Lengths are metres, times mission seconds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     pub world: String,

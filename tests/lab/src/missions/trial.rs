@@ -51,9 +51,8 @@ impl Rules {
 #[derive(Debug, Default)]
 pub struct Scene {
     pub shapes: Shapes,
-    /// The shortest path ignores these.
+    /// The shortest path ignores these and `people`.
     pub things: Vec<Thing>,
-    /// The shortest path ignores these.
     pub people: Vec<Person>,
     pub start: DVec2,
     /// Counter-clockwise from x.

@@ -100,7 +100,6 @@ pub fn run_forwarder(robot: &RobotName, place: &str, supervisor: u32) -> Result 
     }
 }
 
-/// Publishes a sample of `to` for each of `from`.
 fn forward<H: Stamped, E: Payload, To: Stamped + Default, ToE: Payload>(
     (robot, place, supervisor): (&RobotName, &str, u32),
     from: &Topic<H, E>,

@@ -40,7 +40,7 @@ impl ProcessSet {
         Self { root, first: None, last: None, pss_kib: 0 }
     }
 
-    /// Counts now. A started process restarts the count, and the first ended one stops it.
+    /// A started process restarts the count, and the first ended one stops it.
     pub fn look(&mut self) {
         let now = Counts::of(self.root);
         match &self.first {
