@@ -2,7 +2,8 @@
 //!
 //! A delay that begins cannot show what is yet to come: readings pause, or those of a while ago come
 //! again. Sensors of a moving robot repeat their readings by chance, but not all with the same lag,
-//! unless the robot is where it was that time ago. Each lag has a sum of log-likelihood ratios, as in Page's test.
+//! unless the robot is where it was that time ago. Each lag has a sum of log-likelihood ratios, as in
+//! Page's test.
 
 use std::collections::{BTreeMap, VecDeque};
 
