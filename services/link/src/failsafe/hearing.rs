@@ -18,7 +18,10 @@ use common::{
     samples::{RangeReading, RangeStatus},
 };
 
-use super::echoes::{Echoes, Listener};
+use super::{
+    echoes::{Echoes, Listener},
+    motion_bank::motion_m,
+};
 
 /// Sums of misses of one sonar, and of all: doubted, and surely deaf.
 const ONE: [f64; 2] = [10.0, 16.0];
@@ -38,10 +41,10 @@ const SPELLS: u32 = 3;
 const NEARER_M: f64 = 0.45;
 const SQUARE_DEG: f64 = 12.0;
 const BESIDE_DEG: f64 = 15.0;
-/// Motion after which a missed echo counts again, metres and radians. From the same pose, the same
-/// echo is missed again.
+/// Motion after which a missed echo counts again, metres, and metres per radian of turn. From the
+/// same pose, the same echo is missed again.
 const FRESH_M: f64 = 0.03;
-const FRESH_RAD: f64 = 0.05;
+const M_PER_RAD: f64 = 0.6;
 /// Silent readings that may be chance.
 const SILENCES: u32 = 4;
 
@@ -138,10 +141,8 @@ impl Hearing {
     pub(super) fn take(&mut self, readings: &[RangeReading], robot: Pose2, at_s: f64) {
         let memory = &mut self.memory;
         memory.echoes.forget(at_s);
-        let turned_rad = (robot.heading - memory.robot.heading).abs();
-        let went_m = robot.position.distance(memory.robot.position);
-        let share = (went_m / FRESH_M + turned_rad / FRESH_RAD).min(1.0);
-        memory.robot = robot;
+        let before = std::mem::replace(&mut memory.robot, robot);
+        let share = (motion_m([before, robot], M_PER_RAD) / FRESH_M).min(1.0);
         let is_silent = readings.iter().all(|it| it.status() != RangeStatus::Measured);
         for reading in readings {
             let Some(sensor) = self.sensors.get(&reading.sensor) else { continue };

@@ -22,7 +22,7 @@ use super::{
     motion_bank::{
         Bank,
         Hypothesis::{self, Late, Rolls},
-        Poses, Row, rolled,
+        Poses, Row, motion_m, rolled,
     },
     repeats::Repeats,
 };
@@ -49,8 +49,9 @@ const KNOWN: f64 = 0.82;
 /// Share of a sonar's field of view, to either side, that may hold its surface: its edge reaches
 /// beyond the middle.
 const HEARD: f64 = 2.0 / 3.0;
-/// Least motion between readings: metres plus a tenth of the turn in radians.
+/// Least motion between readings, metres, and metres per radian of turn.
 const MOVED_M: f64 = 0.004;
+const M_PER_RAD: f64 = 0.1;
 /// Least and most motion time between readings, seconds.
 const APART_S: [f64; 2] = [0.1, 0.5];
 /// Ages of compared hits, seconds of motion, and their number.
@@ -135,11 +136,8 @@ impl RangeMotion {
             };
         }
         let robots = self.robots;
-        let moved = std::array::from_fn(|it| {
-            let [now, then] = [robots[it], self.latest[it]];
-            let turned_m = 0.1 * (now.heading - then.heading).abs();
-            now.position.distance(then.position) + turned_m >= MOVED_M
-        });
+        let moved =
+            std::array::from_fn(|it| motion_m([self.latest[it], robots[it]], M_PER_RAD) >= MOVED_M);
         // A clock may have been set back.
         let passed_s = (at_s - self.newest_s).abs().min(APART_S[1]);
         if passed_s < APART_S[0] || moved == [false; ALL.len()] {

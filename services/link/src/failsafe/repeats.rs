@@ -7,7 +7,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use super::motion_bank::{Hypothesis, Poses};
+use super::motion_bank::{Hypothesis, Poses, motion_m};
 
 /// Least change from one reading to the next that shows motion, and tolerance of a repeated one,
 /// metres.
@@ -45,8 +45,7 @@ impl Repeats {
         let now = poses.at(at_s);
         let has_moved = std::array::from_fn(|lag| {
             let then = poses.at(at_s - lag as f64 * STEP_S);
-            let turned_m = M_PER_RAD * (now.heading - then.heading).abs();
-            now.position.distance(then.position) + turned_m > MOVED_M
+            motion_m([then, now], M_PER_RAD) > MOVED_M
         });
         for (sensor, range_m) in readings {
             self.take_one(sensor, range_m, at_s, has_moved);

@@ -83,9 +83,8 @@ impl ScanMotion {
             return;
         }
         let some = scan.beams.iter().step_by((scan.beams.len() / REPEATING).max(1));
-        let some = some.map(|range| f64::from(*range));
-        let finite = (0..).zip(some).filter(|(_, range)| range.is_finite());
-        self.repeats.take(finite, poses, at_s);
+        let ranges = (0..).zip(some.map(|range| f64::from(*range)));
+        self.repeats.take(ranges.filter(|(_, range)| range.is_finite()), poses, at_s);
         if let Some((newest_s, newest)) = self.scans.back()
             && let Some((first_s, first)) = self.scans.front()
             && (APART_S..=MOST_APART_S).contains(&(newest_s - first_s))
