@@ -2,7 +2,7 @@
 //!
 //! The supervisor owns the robot's directory and shared memory. It reads the stages' outputs from
 //! the bus and orders the robot to drive or to stand. The crate `processes` starts and restarts the
-//! stages.
+//! stages. Failures of code that only reports never end a mission.
 //!
 //! # The loop
 //!

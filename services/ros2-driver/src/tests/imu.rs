@@ -13,9 +13,8 @@ const GYRO: &str = "robot.rate_hz = 10\nrobot.ros2.imu = '/imu'\n";
 const TURNS: u8 = 3;
 
 fn imu() -> Vec<u8> {
-    let zeros = [0; 9 * 8];
+    let zeros = |count: usize| &[0; 9 * 8][..count * 8];
     let [begin, rate, variance] = IMU;
-    let zeros = |count: usize| &zeros[..count * 8];
     let diagonal = [zeros(3), variance, zeros(3), variance].concat();
     [begin, zeros(8), zeros(2), rate, &diagonal, zeros(3), zeros(9)].concat()
 }
