@@ -22,11 +22,13 @@ use glam::DVec2;
 
 use crate::{
     deskew::Placed,
-    reading::{Fan, Rows},
+    reading::{Fan, GAP_M, Rows},
 };
 
-/// Interval of tracked scans, age of scans that show motion and rest, and retention of scans.
+/// Interval of tracked scans, least age of a scan that shows what stood, age of scans that show
+/// motion and rest, and retention of scans.
 const APART_S: f64 = 0.09;
+const STOOD_S: f64 = 0.25;
 const CAME_S: f64 = 0.4;
 const STANDS_S: f64 = 1.5;
 const KEPT_S: f64 = 2.0;
@@ -39,11 +41,8 @@ const OTHER: f64 = 3.0;
 const LEAST_BEAMS: usize = 4;
 /// One in this many of an object's beams must end where it newly appeared.
 const OF_BEAMS: usize = 6;
-/// Maximum distance of neighbouring ends on an object: metres, and beam spacings.
-const GAP_M: f64 = 0.3;
-const GAP: f64 = 3.0;
 /// Maximum width of a tracked object.
-const WIDEST_M: f64 = 1.6;
+pub(crate) const WIDEST_M: f64 = 1.6;
 /// Maximum expected speed, and distance between two middles of a static object.
 const FASTEST_M_S: f64 = 2.5;
 const NEAR_M: f64 = 0.15;
@@ -154,6 +153,26 @@ impl Movers {
             assert!((self.scans.len() as f64) < KEPT_S / APART_S + 2.0);
         }
         beams
+    }
+
+    pub(crate) fn count(&self) -> usize {
+        self.tracks.iter().filter(|track| track.is_mover).count()
+    }
+
+    /// Returns whether a mover may be at a place in the frame of the scans.
+    pub(crate) fn are_at(&self, place: DVec2, at_s: f64) -> bool {
+        self.tracks.iter().filter(|track| track.is_mover).any(|track| {
+            let doubt_m = (SURE * track.variance_at(at_s)[0].sqrt()).min(track.radius_m);
+            track.at(at_s).distance(place) <= track.radius_m + NEAR_M + doubt_m
+        })
+    }
+
+    /// Returns which places of a scan's ends showed a surface [`STOOD_S`] earlier too; all if no
+    /// scan is that old.
+    pub(crate) fn stood(&self, rows: &Rows, row: usize, at_s: f64) -> impl Fn(DVec2) -> bool {
+        let old = self.scans.iter().rev().find(|(then, ..)| at_s - then >= STOOD_S);
+        let before = old.and_then(|(_, robot, beams)| rows.scan(row, *robot, beams));
+        move |place| before.as_ref().is_none_or(|it| Difference::of(it, place).has_same())
     }
 
     fn follow(&mut self, things: &[Thing], fan: &Fan<'_>, at_s: f64, laser: DVec2) {
@@ -348,9 +367,8 @@ fn things(fan: &Fan<'_>, before: Option<&Fan<'_>>, at_s: f64) -> Vec<Thing> {
         ends[beam % count].map_or(f64::INFINITY, |end: DVec2| end.distance(fan.origin))
     };
     let joins = |beam: usize| {
-        let spacing_m = fan.step_rad * range(beam).min(range(beam + 1));
         let pair = ends[beam % count].zip(ends[(beam + 1) % count]);
-        pair.is_some_and(|(one, next)| one.distance(next) <= GAP_M.max(GAP * spacing_m))
+        pair.is_some_and(|(one, next)| fan.joins(one, next))
     };
     // Cut a circle at a gap.
     let cut = (0..count).find(|beam| is_circle && !joins(*beam)).map_or(0, |beam| beam + 1);

@@ -17,6 +17,9 @@ use crate::{
 
 /// Mapped range of the reading "4 cm or nearer".
 const CONTACT_M: f64 = 0.04;
+/// Maximum distance of neighbouring ends on a surface: metres, and beam spacings.
+pub(crate) const GAP_M: f64 = 0.3;
+const GAP: f64 = 3.0;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Rows {
@@ -170,6 +173,12 @@ impl Fan<'_> {
     pub(crate) fn deviation_m(&self, end: DVec2) -> f64 {
         let (least_m, share) = self.noise;
         least_m + share * end.distance(self.origin)
+    }
+
+    /// Returns whether two neighbouring ends lie on one surface.
+    pub(crate) fn joins(&self, one: DVec2, next: DVec2) -> bool {
+        let nearer_m = one.distance(self.origin).min(next.distance(self.origin));
+        one.distance(next) <= GAP_M.max(GAP * self.step_rad * nearer_m)
     }
 
     /// Returns whether the first beam follows the last.

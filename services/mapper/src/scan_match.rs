@@ -5,6 +5,11 @@
 //! where wheels and gyro carried the newest match. Wheels and gyro also constrain directions that
 //! no surface does, such as along a corridor.
 //!
+//! If few points fit there, either the wheels slipped or things moved. A narrow search then holds
+//! the wheels' motion by what stood before, and a wide one lets them slip. Pieces of the scan vote
+//! between the two: fewer votes let wheels slip that turn than wheels at rest, and each known mover
+//! makes it likelier that pieces move.
+//!
 //! A keyframe adds surfaces that are not known yet, removes those that the laser looks through, and
 //! forgets those unseen for [`KEPT_M`] of travel. Known surfaces keep their place, so the matcher
 //! drifts only as it sees new ones. Each keyframe adds the share of a match's covariance that its
@@ -34,10 +39,17 @@ use crate::{
 /// Minimum deviation of a point from its line. Walls are rough even if the laser's noise is lower.
 /// With less, people beside the robot outweigh walls far away, where a laser is noisier.
 const POINT_M: f64 = 0.05;
-/// Deviation of wheels that do not slip between two scans: metres and radians.
+/// Greatest deviation of wheels that do not slip between two scans: metres and radians.
 const PRIOR: [f64; 2] = [0.02, 0.01];
-/// Drift of a scan without a match: metres and radians.
-const LOST: [f64; 2] = [0.10, 0.05];
+/// Deviation of wheels that may slip: at rest, metres or radians; as a share of the motion; and
+/// metres per radian of turn.
+const AT_REST: f64 = 0.0005;
+const SLIPS: f64 = 0.5;
+const ARM_M: f64 = 0.2;
+/// Drift of a scan without a match, in deviations of the wheels.
+const LOST: f64 = 3.0;
+/// Logarithm of how much likelier a piece stands than moves, where nothing is known to move.
+const VOTE: f64 = 3.0;
 /// Gates from a point to the nearest surface: of the first round and of the last, metres.
 const GATES_M: [f64; 2] = [CELL_M, 0.1];
 /// Last gate in deviations of a noisy point.
@@ -100,8 +112,17 @@ pub(crate) struct Surroundings {
 struct Match {
     pose: Pose2,
     covariance: DMat3,
-    /// Share of points that found a surface.
+    /// Votes of the points that found a surface, and their share of all votes.
+    votes: f64,
     share: f64,
+}
+
+/// Where a search looks for surfaces first, and whether wheels that went far from them hold it.
+#[derive(Clone, Copy, PartialEq)]
+enum Search {
+    Narrow,
+    Wide,
+    Held,
 }
 
 #[derive(Clone, Debug)]
@@ -147,9 +168,16 @@ impl ScanMatcher {
             Surroundings { pose: reckoned, odometry, drift, ..Surroundings::default() }
         });
         let mut fan = rows.scan(self.row, Pose2::default(), &scan.beams)?;
+        let at_s = scan.capture_ns as f64 * 1e-9;
+        let carried = held.carried(odometry);
+        let turned = DVec2::from_angle(carried.heading);
+        let place = |point: &Point| carried.position + turned.rotate(point.at);
         let mut seen = points(&fan);
-        let matched = held.matched(&seen, odometry);
-        let robot = matched.as_ref().map_or(held.carried(odometry), |matched| matched.pose);
+        seen.retain(|point| !movers.are_at(place(point), at_s));
+        let stood = movers.stood(rows, self.row, at_s);
+        let matched = held.matched(&seen, odometry, movers.count(), |point| stood(place(point)));
+        drop(stood);
+        let robot = matched.as_ref().map_or(carried, |matched| matched.pose);
         let without = movers.take(rows, scan, robot);
         if let Some(beams) = &without {
             fan = rows.scan(self.row, Pose2::default(), beams)?;
@@ -190,7 +218,7 @@ impl Surroundings {
         let (pose, lost) = match matched {
             Some(Match { pose, .. }) => (*pose, DMat3::ZERO),
             None if self.surfaces.is_empty() => (self.pose, DMat3::ZERO),
-            None => (self.carried(odometry), variances(LOST)),
+            None => (self.carried(odometry), LOST * LOST * self.prior(odometry)),
         };
         let way = pose.position - self.pose.position;
         let carried = DMat3::from_cols(DVec3::X, DVec3::Y, way.perp().extend(1.0));
@@ -207,40 +235,54 @@ impl Surroundings {
 
     /// Returns the best-fit pose of a scan; none if too few of its points are on surfaces.
     ///
-    /// The search is wide only if surfaces right where the wheels say fit too few points, so that a
-    /// thing is not taken for another one beside it.
-    fn matched(&mut self, points: &[Point], odometry: Pose2) -> Option<Match> {
+    /// `stood` tells whether a point showed a surface before too.
+    fn matched(
+        &mut self,
+        points: &[Point],
+        odometry: Pose2,
+        movers: usize,
+        stood: impl Fn(&Point) -> bool,
+    ) -> Option<Match> {
         if self.index.is_empty() {
             self.reindex();
         }
-        let beside = self.matched_within(GATES_M[1], points, odometry);
-        if beside.as_ref().is_some_and(|found| found.share >= SURE_SHARE) {
-            return beside;
+        let every = points.len().div_ceil(POINTS).max(1);
+        let mut points: Vec<_> = points.iter().step_by(every).collect();
+        let near = self.matched_if(Search::Narrow, &points, every, odometry);
+        if near.as_ref().is_some_and(|near| near.share >= SURE_SHARE) {
+            return near;
         }
-        let wide = self.matched_within(GATES_M[0], points, odometry);
-        let share = |found: &Option<Match>| found.as_ref().map_or(0.0, |found| found.share);
-        if share(&wide) > share(&beside) { wide } else { beside }
+        let slipped = self.matched_if(Search::Wide, &points, every, odometry);
+        points.retain(|point| stood(point));
+        let held = self.matched_if(Search::Held, &points, every, odometry);
+        let Some(found) = &slipped else { return held };
+        let gone = off(found.pose, self.carried(odometry));
+        let unlikely = gone.dot(variances(self.slips(odometry)).inverse() * gone).ln_1p();
+        let gained = found.votes - held.as_ref().map_or(0.0, |held| held.votes);
+        if VOTE * gained > unlikely * (1.0 + movers as f64) { slipped } else { held }
     }
 
-    fn matched_within(
+    fn matched_if(
         &mut self,
-        first_gate_m: f64,
-        points: &[Point],
+        search: Search,
+        points: &[&Point],
+        every: usize,
         odometry: Pose2,
     ) -> Option<Match> {
         let start = self.carried(odometry);
-        let every = points.len().div_ceil(POINTS).max(1);
-        let used = points.len().div_ceil(every);
         // The surface has errors, too, but averages over its points.
         let of_lines = 1.0 + 1.0 / every as f64;
-        let prior = variances(PRIOR).inverse();
-        let (mut pose, mut gate_m) = (start, first_gate_m);
+        let holds = search == Search::Held;
+        // The full deviation: wheels at rest would hold the first round of a search where it is.
+        let prior = if holds { self.prior(odometry) } else { variances(PRIOR) }.inverse();
+        let (mut pose, mut gate_m) = (start, GATES_M[usize::from(search != Search::Wide)]);
         let (mut information, mut squares, mut fits) = (DMat3::ZERO, 0.0, Vec::new());
-        let mut found = 0;
+        let mut votes = 0.0;
         for _ in 0..ROUNDS {
             let turned = DVec2::from_angle(pose.heading);
             fits.clear();
-            for point in points.iter().step_by(every) {
+            votes = 0.0;
+            for point in points {
                 let arm = turned.rotate(point.at);
                 let at = pose.position + arm;
                 let gate_m = gate_m.max(GATE * point.deviation_m).min(GATES_M[0]);
@@ -251,20 +293,22 @@ impl Surroundings {
                     continue;
                 }
                 surface.seen_m = self.travelled_m;
+                votes += every as f64 * point.vote;
                 let off = surface.normal.dot(at - surface.at);
                 let by = surface.normal.extend(surface.normal.dot(arm.perp()));
                 let variance = of_lines * point.deviation_m * point.deviation_m;
                 fits.push((off, by, variance.max(POINT_M * POINT_M).recip()));
             }
-            found = fits.len();
-            if found < LEAST_POINTS || (found as f64) < LEAST_SHARE * used as f64 {
+            let found = fits.len();
+            if found < LEAST_POINTS || (found as f64) < LEAST_SHARE * points.len() as f64 {
                 return None;
             }
             let kept = (KEPT_SHARE * found as f64).ceil() as usize;
             fits.select_nth_unstable_by(kept - 1, |a, b| a.0.abs().total_cmp(&b.0.abs()));
-            let gone = (pose.position - start.position).extend(pose.heading - start.heading);
+            let gone = off(pose, start);
             // Cauchy's weight: wheels that slipped far do not hold the match.
-            let prior = prior * (1.0 + gone.dot(prior * gone)).recip();
+            let weight = if holds { 1.0 } else { (1.0 + gone.dot(prior * gone)).recip() };
+            let prior = weight * prior;
             let mut pull = -(prior * gone);
             (information, squares) = (DMat3::ZERO, 0.0);
             for (off, by, weight) in &fits[..kept] {
@@ -284,10 +328,12 @@ impl Surroundings {
         // The identity stands for directions that the scan leaves unconstrained.
         let covariance =
             (information + DMat3::IDENTITY).inverse() * squares.clamp(SCALES[0], SCALES[1]);
+        let all = every as f64 * points.iter().map(|point| point.vote).sum::<f64>();
         (is_finite(pose) && covariance.is_finite()).then(|| Match {
             pose,
             covariance,
-            share: found as f64 / used as f64,
+            votes,
+            share: votes / all,
         })
     }
 
@@ -305,7 +351,7 @@ impl Surroundings {
         self.surfaces.retain(|surface| surface.seen_m >= oldest_m && !is_gone(surface));
         self.reindex();
         let (mut new, mut all) = (0_u32, 0_u32);
-        for Point { at, normal, deviation_m } in points {
+        for Point { at, normal, deviation_m, .. } in points {
             let Some(normal) = normal else { continue };
             all += 1;
             let at = position + turned.rotate(*at);
@@ -339,6 +385,18 @@ impl Surroundings {
         self.index = Index::new(&self.surfaces);
     }
 
+    /// Returns the deviations of wheels that may have slipped since the newest match.
+    fn slips(&self, odometry: Pose2) -> [f64; 2] {
+        let way_m = odometry.position.distance(self.odometry.position);
+        let turn = (odometry.heading - self.odometry.heading).abs();
+        [way_m + ARM_M * turn, way_m + turn].map(|motion| AT_REST + SLIPS * motion)
+    }
+
+    fn prior(&self, odometry: Pose2) -> DMat3 {
+        let [place, heading] = self.slips(odometry);
+        variances([place.min(PRIOR[0]), heading.min(PRIOR[1])])
+    }
+
     /// Returns the newest match, moved as the wheels went since.
     pub(crate) fn carried(&self, odometry: Pose2) -> Pose2 {
         let turned = DVec2::from_angle(self.pose.heading - self.odometry.heading);
@@ -350,6 +408,10 @@ impl Surroundings {
 
 fn is_finite(pose: Pose2) -> bool {
     pose.position.is_finite() && pose.heading.is_finite()
+}
+
+fn off(pose: Pose2, from: Pose2) -> DVec3 {
+    (pose.position - from.position).extend(pose.heading - from.heading)
 }
 
 fn variances([place, heading]: [f64; 2]) -> DMat3 {
@@ -481,6 +543,36 @@ mod tests {
     }
 
     #[test]
+    fn a_near_drum_that_passes_a_standing_robot_does_not_take_it_along() {
+        // Six far posts stand; the drum has more beams than all of them.
+        let scan = |drum: DVec2| {
+            let posts = (-3..3).map(|post| (5.0 * DVec2::from_angle(0.5 * f64::from(post)), 0.3));
+            let discs = Vec::from_iter(posts.chain([(drum, 0.6)]));
+            let beam = |beam| {
+                let along = DVec2::from_angle(f64::from(beam - 180).to_radians());
+                let origin = MISSION.sensor_table()[0].mount.on(START).position;
+                let ends = discs.iter().filter_map(|(at, radius)| {
+                    let (near, aside) = ((*at - origin).dot(along), (*at - origin).perp_dot(along));
+                    (near > 0.0 && aside.abs() < *radius)
+                        .then(|| near - (radius * radius - aside * aside).sqrt())
+                });
+                ends.fold(f64::INFINITY, f64::min) as f32
+            };
+            Vec::from_iter((0..360).map(beam))
+        };
+        let drum = |step: i32| dvec2(0.2 * f64::from(step) - 1.0, 1.2);
+        let (mut held, mut movers) = (None, Movers::default());
+        for step in 0..10 {
+            let capture_ns = 140_000_000 * step as u64;
+            let beams = scan(drum(step));
+            let scan = Placed { row: 0, robot: PoseSample::default(), capture_ns, beams };
+            MATCHER.0.step(&MATCHER.1, &mut held, &[scan], &mut movers);
+            let off_m = held.as_ref().unwrap().pose.position.length();
+            assert!(off_m < 0.02, "{step}: {off_m}");
+        }
+    }
+
+    #[test]
     fn a_thing_is_not_taken_for_another_one_beside_it() {
         // The corridor ends ahead.
         let ends_at = |x: f64| {
@@ -502,7 +594,7 @@ mod tests {
         let there = Pose2 { position: dvec2(0.2, 0.0), heading: 0.1 };
         assert_eq!(matched(held, there, &hall), None);
         let fix = matched(held, there, &hall).unwrap();
-        assert!(fix.x_m > 0.19 && fix.shared[0] >= LOST[0] * LOST[0], "{fix:?}");
+        assert!(fix.x_m > 0.19 && fix.shared[0] >= (LOST * PRIOR[0]).powi(2), "{fix:?}");
     }
 
     #[test]

@@ -1,15 +1,20 @@
 //! Points of a scan, with the normals of the lines through their neighbours.
+//!
+//! Points vote on what stands. A gapless piece no wider than a mover has one vote, because it may
+//! move as one.
 
 use common::geometry::principal_axes;
 use glam::DVec2;
 
-use crate::reading::Fan;
+use crate::{movers::WIDEST_M, reading::Fan};
 
 /// Half-length of a line: minimum in metres, and deviations of a noisy point.
 const LINE_M: f64 = 0.06;
 const LINE: f64 = 2.5;
 /// Maximum RMS distance of points from their line, relative to its half-length.
 const STRAIGHT: f64 = 0.5;
+/// Number of points from which a piece has its whole vote.
+const VOTERS: usize = 4;
 
 /// A point of a scan in the robot's frame.
 pub(crate) struct Point {
@@ -17,6 +22,8 @@ pub(crate) struct Point {
     /// None for points off a line.
     pub normal: Option<DVec2>,
     pub deviation_m: f64,
+    /// Share of its piece's vote.
+    pub vote: f64,
 }
 
 /// Returns a scan's points. Those on lines are their line's, because lines lie behind the points of
@@ -35,9 +42,23 @@ pub(crate) fn points(fan: &Fan<'_>) -> Vec<Point> {
         let (at, normal) = line.map_or((at, None), |(middle, normal)| {
             (middle, Some(if normal.dot(fan.origin - middle) < 0.0 { -normal } else { normal }))
         });
-        Some(Point { at, normal, deviation_m })
+        Some(Point { at, normal, deviation_m, vote: 0.0 })
     };
-    (0..ends.len()).filter_map(point).collect()
+    let mut points: Vec<_> = (0..ends.len()).filter_map(point).collect();
+    let mut rest = &mut points[..];
+    while let Some(first) = rest.first() {
+        let (first, mut last) = (first.at, first.at);
+        let ends = rest.iter().position(|point| {
+            let is_apart = !fan.joins(last, point.at) || point.at.distance(first) > WIDEST_M;
+            last = point.at;
+            is_apart
+        });
+        let (piece, others) = rest.split_at_mut(ends.unwrap_or(rest.len()));
+        let vote = (piece.len().max(VOTERS) as f64).recip();
+        piece.iter_mut().for_each(|point| point.vote = vote);
+        rest = others;
+    }
+    points
 }
 
 /// Returns the middle and the normal of the line through points; none for fewer than three, or
