@@ -272,10 +272,10 @@ impl Surroundings {
         let start = self.carried(odometry);
         // The surface has errors, too, but averages over its points.
         let of_lines = 1.0 + 1.0 / every as f64;
-        let is_wide = search == Search::Wide;
-        // Wheels at rest would hold the first round of a wide search where it is.
-        let prior = if is_wide { variances(PRIOR) } else { self.prior(odometry) }.inverse();
-        let (mut pose, mut gate_m) = (start, GATES_M[usize::from(!is_wide)]);
+        let holds = search == Search::Held;
+        // The full deviation: wheels at rest would hold the first round of a search where it is.
+        let prior = if holds { self.prior(odometry) } else { variances(PRIOR) }.inverse();
+        let (mut pose, mut gate_m) = (start, GATES_M[usize::from(search != Search::Wide)]);
         let (mut information, mut squares, mut fits) = (DMat3::ZERO, 0.0, Vec::new());
         let mut votes = 0.0;
         for _ in 0..ROUNDS {
@@ -307,8 +307,7 @@ impl Surroundings {
             fits.select_nth_unstable_by(kept - 1, |a, b| a.0.abs().total_cmp(&b.0.abs()));
             let gone = off(pose, start);
             // Cauchy's weight: wheels that slipped far do not hold the match.
-            let weight =
-                if search == Search::Held { 1.0 } else { (1.0 + gone.dot(prior * gone)).recip() };
+            let weight = if holds { 1.0 } else { (1.0 + gone.dot(prior * gone)).recip() };
             let prior = weight * prior;
             let mut pull = -(prior * gone);
             (information, squares) = (DMat3::ZERO, 0.0);
