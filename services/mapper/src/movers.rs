@@ -100,11 +100,13 @@ struct Track {
     variance: [f64; 3],
 }
 
+type Kept = (f64, Pose2, Vec<f32>);
+
 /// Tracker state, unsaved: the next process finds movers again within a second.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Movers {
     /// Times, poses and beams, oldest first.
-    scans: VecDeque<(f64, Pose2, Vec<f32>)>,
+    scans: VecDeque<Kept>,
     tracks: Vec<Track>,
     seen_s: Option<f64>,
     placed: Vec<Mover>,
@@ -118,11 +120,7 @@ impl Movers {
         let at_s = scan.capture_ns as f64 * 1e-9;
         let fan = rows.scan(scan.row, robot, &scan.beams)?;
         let scans = std::mem::take(&mut self.scans);
-        let older = |by_s: f64| {
-            let older = scans.iter().rev().find(|(then, ..)| at_s - then >= by_s);
-            let (then_s, robot, beams) = older?;
-            Some((at_s - then_s, rows.scan(scan.row, *robot, beams)?))
-        };
+        let older = |by_s| older(&scans, rows, scan.row, at_s, by_s);
         let is_next = scans.back().is_none_or(|(newest, ..)| at_s - newest >= APART_S);
         if is_next {
             // At first, no scan is that old.
@@ -170,9 +168,8 @@ impl Movers {
     /// Returns which places of a scan's ends showed a surface [`STOOD_S`] earlier too; all if no
     /// scan is that old.
     pub(crate) fn stood(&self, rows: &Rows, row: usize, at_s: f64) -> impl Fn(DVec2) -> bool {
-        let old = self.scans.iter().rev().find(|(then, ..)| at_s - then >= STOOD_S);
-        let before = old.and_then(|(_, robot, beams)| rows.scan(row, *robot, beams));
-        move |place| before.as_ref().is_none_or(|it| Difference::of(it, place).has_same())
+        let before = older(&self.scans, rows, row, at_s, STOOD_S);
+        move |place| before.as_ref().is_none_or(|(_, it)| Difference::of(it, place).has_same())
     }
 
     fn follow(&mut self, things: &[Thing], fan: &Fan<'_>, at_s: f64, laser: DVec2) {
@@ -358,6 +355,18 @@ impl Thing {
             _ => (whole, self.noise_m + hidden * self.half_width_m),
         }
     }
+}
+
+/// Returns the newest scan that is `by_s` seconds older, and its age.
+fn older<'a>(
+    scans: &'a VecDeque<Kept>,
+    rows: &Rows,
+    row: usize,
+    at_s: f64,
+    by_s: f64,
+) -> Option<(f64, Fan<'a>)> {
+    let (then_s, robot, beams) = scans.iter().rev().find(|(then, ..)| at_s - then >= by_s)?;
+    Some((at_s - then_s, rows.scan(row, *robot, beams)?))
 }
 
 fn things(fan: &Fan<'_>, before: Option<&Fan<'_>>, at_s: f64) -> Vec<Thing> {
