@@ -54,6 +54,13 @@ impl Repeats {
 
     fn take_one(&mut self, sensor: u8, range_m: f64, at_s: f64, has_moved: [bool; LAGS]) {
         let past = self.past.entry(sensor).or_default();
+        // Frames that come at once waited somewhere. Their times are unknown, and the last is now's.
+        if let Some([then_s, before_m]) = past.back_mut()
+            && (0.0..STEP_S / 2.0).contains(&(at_s - *then_s))
+        {
+            *before_m = range_m;
+            return;
+        }
         if past.back().is_some_and(|[_, before_m]| (range_m - before_m).abs() > CHANGES_M) {
             let mut repeats = [false; LAGS];
             let same = past.iter().filter(|[_, then_m]| (range_m - then_m).abs() < SAME_M);
@@ -90,5 +97,30 @@ impl Repeats {
     /// Returns the greatest evidence of a lag; 1 is sure.
     pub(super) fn doubt(&self) -> f64 {
         self.sums.iter().fold(0.0, |most: f64, sum| most.max(sum / LIMITS[1]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use common::kinematics::Pose2;
+
+    use super::*;
+    use crate::testing::at;
+
+    #[test]
+    fn readings_that_waited_and_come_at_once_are_one_and_show_no_delay() {
+        let (mut repeats, mut poses) = (Repeats::default(), Poses::default());
+        let mut take = |at_s: f64, range_m: f64| {
+            poses.robot_is(Pose2 { position: [at_s, 0.0].into(), ..Pose2::default() }, at(at_s));
+            repeats.take([(0, range_m)].into_iter(), &poses, at_s);
+        };
+        let range_m = |tick: u32| 1.0 + (0.618 * f64::from(tick)).fract();
+        for tick in 0..20 {
+            take(f64::from(tick) / 7.0, range_m(tick));
+        }
+        for waited in 0..40 {
+            take(3.5 + 1e-3 * f64::from(waited), range_m(18 + waited % 2));
+        }
+        assert_eq!(repeats.judged(false, ""), None);
     }
 }
