@@ -85,8 +85,12 @@ fn one(random: &mut Random, mission: &Mission, at: Duration, all: &mut Vec<Distu
         0..=2 => add(now, Kill(stage)),
         3..=4 => add(now, KillAfter(stage, operations)),
         5 => {
-            add(now, Freeze(stage));
-            add(lasts, Thaw(stage));
+            // The whole machine may stand still.
+            let is_frozen = |it: &str| it == stage || operations < 80;
+            for stage in stages::TABLE.iter().map(|stage| stage.name).filter(|it| is_frozen(it)) {
+                add(now, Freeze(stage));
+                add(lasts, Thaw(stage));
+            }
         }
         6 => add(now, Hang(stage)),
         7 => add(now, KillSupervisor(operations)),

@@ -99,6 +99,8 @@ pub(crate) struct Invariants {
     obedience_changed: Duration,
     /// Whether a fault or a touch has made the robot's reports untrue.
     has_lied: bool,
+    /// Whether the robot had a fault or touched something, or its wire lost or delayed something.
+    was_faulty: bool,
     /// Stages that were disturbed, and when.
     disturbed: Vec<(&'static str, Duration)>,
     command: u64,
@@ -133,7 +135,11 @@ impl Invariants {
             | Hang(stage)
             | Break(stage, _)
             | Ask(Request::Restart(stage)) => self.disturbed.push((stage, now)),
-            Wire(Way::ToRobot, quality) => {
+            Wire(way, quality) => {
+                self.was_faulty = true;
+                if *way == Way::ToHost {
+                    return;
+                }
                 self.wire_is_calm = *quality == Quality::default();
                 self.obedience_changed = now;
             }
@@ -141,8 +147,9 @@ impl Invariants {
                 self.obeys = !fault.is_some_and(RobotFault::keeps_speed);
                 self.obedience_changed = now;
                 self.has_lied |= fault.is_some_and(RobotFault::lies);
+                self.was_faulty |= fault.is_some();
             }
-            KillSupervisor(_) | Wire(..) | Ask(_) | Beacon(_) | End => {}
+            KillSupervisor(_) | Ask(_) | Beacon(_) | End => {}
         }
     }
 
@@ -246,6 +253,11 @@ impl Invariants {
                 format!("{link:?}")
             })?;
             let cause = link.stopped().then(|| link.cause());
+            let blames =
+                matches!(cause, Some(Cause::RangeImplausible | Cause::OdometryImplausible));
+            holds(!blames || self.was_faulty, "a healthy robot is not blamed", || {
+                format!("{cause:?}")
+            })?;
             if self.causes.last().is_none_or(|(_, before)| *before != cause) {
                 self.causes.push((now, cause));
             }
@@ -255,6 +267,7 @@ impl Invariants {
             let truth = machine.truth_of(&pose);
             // What touches the robot pushes it past its wheels.
             self.has_lied |= truth.is_some_and(|truth| truth.contacts > 0);
+            self.was_faulty |= self.has_lied;
             let off_m = truth.map_or(0.0, |truth| truth.pose_error_m(&pose));
             let most_m = pose_bound_m(&pose);
             holds(self.has_lied || off_m <= most_m, "a pose is where the robot was", || {
