@@ -84,6 +84,10 @@ impl Trace {
         let (mut before, mut rolled): (Option<(WheelSample, WheelCounts)>, _) = (None, [0.0; 2]);
         for wheels in recording.samples(&WHEELS)? {
             let wheels = wheels?;
+            // In lockstep, an unanswered tick is published again.
+            if before.is_some_and(|(old, _)| old.stamp.tick == wheels.stamp.tick) {
+                continue;
+            }
             let counts = WheelCounts::of(&wheels, endless.get(&wheels.stamp.tick));
             if let Some((old, earlier)) = before
                 && old.restarts == wheels.restarts
