@@ -28,6 +28,8 @@ use serde::{
 
 /// For each of three protocols.
 const LISTENS: Duration = Duration::from_secs(4);
+/// Bytes after which no robot is expected: more than any sends in that time.
+const FLOOD: usize = 16 << 20;
 
 /// Write a mission file for the robot that answers at ADDRESS: its protocol, sensors and rates. The
 /// robot is asked, and never moved.
@@ -92,13 +94,14 @@ fn heard(address: &Address<String>) -> Result<Seen> {
     for protocol in [Protocol::Json, Protocol::X80, Protocol::Arduino] {
         let mut seen = Seen::new(protocol)?;
         let mut wire = Transport::of_base(&resolved, &seen.mission)?;
-        let began = Instant::now();
-        // Ends a flood, too.
+        let (began, mut came) = (Instant::now(), 0);
         while let at = began.elapsed()
             && at < LISTENS
+            && came < FLOOD
         {
             wire.maintain(monotonic_ns())?;
             if let Some(bytes) = wire.receive(monotonic_ns())? {
+                came += bytes.len();
                 first.extend(bytes.iter().take(48 - first.len()));
                 seen.hear(bytes, at.as_secs_f64());
             } else {
