@@ -1,10 +1,11 @@
 //! Kills and freezes of processes by phase of the mission. `simulation` draws others.
 //!
-//! `failsafe` tests commands to the wheels meanwhile, `freezes` the detection times.
+//! `failsafe` tests commands to the wheels meanwhile; `bench chaos` measures detection times.
 
 use std::{path::Path, process::Stdio};
 
 use common::geometry::wrap_angle;
+use processes::stages::find as find_stage;
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
@@ -66,6 +67,12 @@ fn each_stage_killed_and_frozen_while_driving_the_robot_arrives_and_every_genera
     let deaths = records(&directory.path().join("run/deaths.jsonl"));
     let hit: Vec<_> = deaths.iter().map(|death| &death["stage"]).collect();
     assert_eq!(hit[..5], STAGES);
+    // No stage is given up before its beat is due.
+    for death in deaths.iter().filter(|death| death["hung"] == true) {
+        let stage = find_stage(death["stage"].as_str().unwrap()).unwrap();
+        let due_s = stage.deadlines.heartbeat.as_secs_f64();
+        assert!(death["noticed_after_s"].as_f64() >= Some(due_s), "{death}");
+    }
     let report = replayed_in(&directory);
     assert!(report.equal() >= 10, "{report}");
 }

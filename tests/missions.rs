@@ -9,7 +9,7 @@ fn latency_is_measured_beside_hops_at_each_rate_and_leaves_nothing_but_what_was_
     // Another robot of this user, with its directory below the removed one.
     let run = Run::under_way("hops-beside", "open-room", ENDLESS, 0.3);
     let measured = |robot: &str, more: &str| {
-        let short = "bench tick --rounds 1 --set timeout_s=15 --json";
+        let short = "bench tick --rounds 1 --set timeout_s=6 --json";
         json_lines(&printed(&words(&format!("{short} --robot {robot} {more}"))))
     };
     let reports = measured("hops", "--busy 1 --set robot.rate_hz=20");
@@ -24,7 +24,7 @@ fn latency_is_measured_beside_hops_at_each_rate_and_leaves_nothing_but_what_was_
         }
         assert!(report["ratio"].as_f64() > Some(0.0), "{report}");
     }
-    let at_30_hz = "--rate 30 --set timeout_s=60 --no-record --consumers 0";
+    let at_30_hz = "--rate 30 --set timeout_s=20 --no-record --consumers 0";
     let reports = measured(support::suite(), at_30_hz);
     assert_eq!(reports.len(), 1, "{reports:?}");
     assert_eq!(reports[0]["regime"], "at 30 Hz");

@@ -91,7 +91,7 @@ proptest! {
 
 proptest! {
     // Each case solves and follows a map several times.
-    #![proptest_config(cases(60))]
+    #![proptest_config(cases(30))]
 
     #[test]
     fn a_field_solved_after_any_changes_from_the_one_before_leads_to_the_target_from_every_cell_that_can_reach_it(
