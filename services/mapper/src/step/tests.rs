@@ -191,14 +191,6 @@ fn four_centimetres_or_nearer_is_mapped_just_ahead_and_never_under_the_robot() {
 }
 
 #[test]
-fn the_targets_cell_is_never_marked() {
-    let mut mapper = mapper("");
-    mapper.sense(at(0.8, 0.0, 0.0), &[echo(0.5)]);
-    let marked = sensed(&mapper);
-    assert!(marked.contains(&(39, 25)) && !marked.contains(&(40, 25)), "{marked:?}");
-}
-
-#[test]
 fn a_priori_shapes_are_hazard_from_the_start_and_after_a_reset() {
     let mut mapper = mapper("[[known.drum]]\nat = [1.0, 1.0]\nradius_m = 0.2");
     let known = |mapper: &Mapper| mapper.cells(|cell| cell == Known).len();
@@ -256,6 +248,11 @@ fn the_cell_of_the_target_is_free_as_long_as_the_robot_is_sent_there() {
         assert_eq!(restored.state().target, dvec2(-1.25, 0.0));
         assert_eq!(send(&mut restored, 1.5), 1, "{method}");
         assert_eq!(restored.ahead(-125), Known, "{method}");
+        // Nor do echoes at it make it hazard.
+        for _ in 0..3 {
+            restored.sense(at(0.8, 0.0, 0.0), &[echo(0.5)]);
+        }
+        assert!(restored.hazard_ahead(140) && !restored.hazard_ahead(150), "{method}");
     }
 }
 

@@ -151,13 +151,6 @@ fn what_is_forgotten_first_is_what_is_not_near_and_then_all_of_it() {
 }
 
 #[test]
-fn the_targets_cell_is_never_hazard() {
-    let mut mapper = mapper("");
-    mapper.hear_from(1.3, 0.0, Some(0.5));
-    assert!(mapper.hazard_ahead(190) && !mapper.hazard_ahead(200));
-}
-
-#[test]
 fn readings_are_published_until_the_wheels_have_rolled_too_far() {
     let beams = |mapper: &Mapper| {
         let header = mapper.header(Part::default());
