@@ -157,7 +157,7 @@ fn a_timed_command_ends_inside_the_period_and_not_where_time_is_ignored() {
 }
 
 #[test]
-fn the_truth_says_how_long_a_wheel_turns_after_the_last_command() {
+fn a_silent_host_stops_the_motors_only_where_the_mission_says_so_and_the_truth_says_how_late() {
     // A speed loop of 60 ms falls from 250 mm/s to 10 mm/s, which counts as rest, in 3.2 time
     // constants.
     let coasting = 0.06 * 25_f64.ln();
@@ -175,19 +175,6 @@ fn the_truth_says_how_long_a_wheel_turns_after_the_last_command() {
     let ignored = stopping_time(own_limit);
     near(ignored - 0.2, coasting, 0.02);
     assert!(stopping_time("simulation = { ignores_time = true }") > 4.0);
-}
-
-#[test]
-fn a_silent_host_stops_the_motors_only_where_the_mission_says_so() {
-    let speed = |text: &str| {
-        let mut robot = robot(text);
-        send(&mut robot, forward(500, None));
-        robot.advance_to(3.0);
-        robot.motors[1].speed
-    };
-    // It keeps going.
-    assert!(speed("") > 499.0);
-    assert_eq!(speed("[simulation]\nstops_when_silent_s = 1.5"), 0.0);
 }
 
 #[test]
