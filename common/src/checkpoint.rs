@@ -174,19 +174,21 @@ mod tests {
         Checkpoint::open(path, CAPACITY).unwrap()
     }
 
-    fn file() -> (tempfile::TempDir, PathBuf) {
+    /// Returns a checkpoint with its path, in which these states were saved.
+    fn saved(states: &[Vec<u32>]) -> (tempfile::TempDir, PathBuf, Checkpoint) {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("pose");
-        (directory, path)
+        let (mut checkpoint, _) = open(&path);
+        for state in states {
+            checkpoint.save(state).unwrap();
+        }
+        (directory, path, checkpoint)
     }
 
     #[test]
     fn a_save_cut_after_any_byte_leaves_the_old_state_or_the_new_one() {
-        let (_directory, path) = file();
-        let (mut checkpoint, _) = open(&path);
-        let (old, new) = (vec![7_u32; 4], vec![9_u32; 4]);
-        checkpoint.save(&vec![1_u32; 6]).unwrap();
-        checkpoint.save(&old).unwrap();
+        let (old, new) = (vec![7; 4], vec![9; 4]);
+        let (_directory, path, mut checkpoint) = saved(&[vec![1; 6], old.clone()]);
         let before = fs::read(&path).unwrap();
         checkpoint.save(&new).unwrap();
         let after = fs::read(&path).unwrap();
@@ -207,7 +209,7 @@ mod tests {
 
     #[test]
     fn the_newest_state_comes_back_of_processes_that_each_save_a_few_times() {
-        let (_directory, path) = file();
+        let (_directory, path, _) = saved(&[]);
         let mut newest = None;
         for process in 0..6_u32 {
             let (mut checkpoint, restored) = open(&path);
@@ -221,10 +223,7 @@ mod tests {
 
     #[test]
     fn noise_or_a_state_with_any_bit_changed_after_its_version_is_not_restored() {
-        let (_directory, path) = file();
-        let (mut checkpoint, _) = open(&path);
-        checkpoint.save(&vec![7_u32; 4]).unwrap();
-        checkpoint.save(&vec![9_u32; 4]).unwrap();
+        let (_directory, path, _) = saved(&[vec![7; 4], vec![9; 4]]);
         let whole = fs::read(&path).unwrap();
         // The second save filled the first slot, whose length equals that of its state.
         for bit in 8 * 4..8 * (HEADER + 5) {
@@ -239,9 +238,7 @@ mod tests {
 
     #[test]
     fn a_whole_state_of_another_type_or_version_is_refused_and_not_taken_for_none() {
-        let (_directory, path) = file();
-        let (mut checkpoint, _) = open(&path);
-        checkpoint.save(&vec![1_u32]).unwrap();
+        let (_directory, path, checkpoint) = saved(&[vec![1]]);
         let refused = Checkpoint::open::<[String; 3]>(&path, CAPACITY).unwrap_err().to_string();
         assert!(refused.contains("cannot be decoded"), "{refused}");
         let mut bytes = fs::read(&path).unwrap();
@@ -255,7 +252,8 @@ mod tests {
     #[test]
     fn room_for_both_slots_is_reserved_at_opening() {
         use std::os::unix::fs::MetadataExt as _;
-        let (_directory, path) = file();
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("pose");
         let (_checkpoint, _) = Checkpoint::open::<Vec<u32>>(&path, 1 << 20).unwrap();
         let reserved = fs::metadata(&path).unwrap().blocks() * 512;
         assert!(reserved >= 2 << 20, "{reserved} bytes are reserved");
@@ -263,9 +261,7 @@ mod tests {
 
     #[test]
     fn a_state_that_does_not_fit_is_refused_and_the_old_one_stays() {
-        let (_directory, path) = file();
-        let (mut checkpoint, _) = open(&path);
-        checkpoint.save(&vec![1_u32]).unwrap();
+        let (_directory, path, mut checkpoint) = saved(&[vec![1]]);
         assert!(matches!(
             checkpoint.save(&vec![1_u32; 100]),
             Err(CheckpointError::TooLarge { .. })
