@@ -207,21 +207,6 @@ fn every_link_and_path_in_readme_and_guide_exists() {
 }
 
 #[test]
-fn every_test_that_a_figure_names_exists() {
-    let tests: String = fs::read_dir(root().join("tests"))
-        .unwrap()
-        .filter_map(|entry| fs::read_to_string(entry.unwrap().path()).ok())
-        .collect();
-    let named = "cargo test -p firsthand ";
-    let code = documents().into_iter().flat_map(|document| document.code());
-    for line in code.filter(|line| line.starts_with(named)) {
-        let test = line[named.len()..].split(' ').next().unwrap();
-        let exists = test.starts_with('-') || tests.contains(&format!("fn {test}"));
-        assert!(exists, "{line}");
-    }
-}
-
-#[test]
 fn every_subcommand_is_listed_in_the_help() {
     let command = commands::command_line();
     let help = command.clone().render_long_help().to_string();
