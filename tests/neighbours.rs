@@ -18,13 +18,10 @@ use crate::support::{
 };
 use common::{
     address::Address,
-    bus::{Bus, BusError},
+    bus::{Bus, BusError, Payload, Stamped, Topic, Writer},
     clock::MissionTime,
     poll,
-    samples::{
-        CommandSample, CommandState, DirectiveSample, GridHeader, GuidanceSample, LinkSample,
-        Order, PoseSample, RangesHeader, WheelSample,
-    },
+    samples::{CommandSample, CommandState, DirectiveSample, Order},
     topics,
     wire::{Addressing, Command},
 };
@@ -39,6 +36,15 @@ use rustix::{
 /// Longest time from a signal to the end of a run with a damaged bus: 3 s, and machine load.
 const ENDS_WITHIN: Duration = Duration::from_secs(20);
 
+/// Publishes default samples in the first and the last tick there can be.
+fn forge<H: Stamped, E: Payload>(bus: &Bus, topic: &Topic<H, E>) -> Writer<H, E> {
+    let mut writer = bus.slice_writer(topic, u32::MAX, 1).unwrap();
+    for tick in [0, u64::MAX] {
+        writer.publish_slice(tick, MissionTime(tick), H::default(), &[]).unwrap();
+    }
+    writer
+}
+
 #[test]
 fn a_second_controller_or_supervisor_and_samples_that_seem_newer_are_ignored_and_told() {
     in_own_process(|| {
@@ -50,24 +56,16 @@ fn a_second_controller_or_supervisor_and_samples_that_seem_newer_are_ignored_and
         let printed = echo.stdout.as_ref().unwrap();
         assert!(poll::is_readable(printed, PATIENCE).unwrap(), "nothing is shown");
         let bus = Bus::join(&domain(robot), "forger").unwrap();
-        macro_rules! forge {
-            ($($topic:ident),*) => {
-                ($(bus.writer(&topics::$topic, u32::MAX).unwrap()),*)
-            };
-        }
-        let (mut wheels, mut pose, mut guidance, mut link) = forge!(WHEELS, POSE, GUIDANCE, LINK);
-        let (mut commands, mut orders) = forge!(COMMAND, DIRECTIVE);
-        let mut ranges = bus.slice_writer(&topics::RANGES, u32::MAX, 1).unwrap();
-        let mut grid = bus.slice_writer(&topics::GRID, u32::MAX, 1).unwrap();
-        for tick in [0, u64::MAX] {
-            let time = MissionTime(tick);
-            ranges.publish_slice(tick, time, RangesHeader::default(), &[]).unwrap();
-            wheels.publish(tick, time, WheelSample::default()).unwrap();
-            pose.publish(tick, time, PoseSample::default()).unwrap();
-            grid.publish_slice(tick, time, GridHeader::default(), &[]).unwrap();
-            guidance.publish(tick, time, GuidanceSample::default()).unwrap();
-            link.publish(tick, time, LinkSample::default()).unwrap();
-        }
+        let forged = (
+            forge(&bus, &topics::RANGES),
+            forge(&bus, &topics::WHEELS),
+            forge(&bus, &topics::POSE),
+            forge(&bus, &topics::GRID),
+            forge(&bus, &topics::GUIDANCE),
+            forge(&bus, &topics::LINK),
+        );
+        let mut commands = bus.writer(&topics::COMMAND, u32::MAX).unwrap();
+        let mut orders = bus.writer(&topics::DIRECTIVE, u32::MAX).unwrap();
         let own = format!("process {}:", std::process::id());
         for reader in ["dead-reckoning", "mapper", "planner", "controller"] {
             let told = || logged(&run.directory(), reader, &["WARN", &own]) == 1;
@@ -88,9 +86,9 @@ fn a_second_controller_or_supervisor_and_samples_that_seem_newer_are_ignored_and
             ..DirectiveSample::default()
         };
         wait_until("the commander is told", || {
-            let forged = MissionTime(u64::MAX);
-            commands.publish(u64::MAX, forged, backwards).unwrap();
-            orders.publish(u64::MAX, forged, stop).unwrap();
+            let newest = MissionTime(u64::MAX);
+            commands.publish(u64::MAX, newest, backwards).unwrap();
+            orders.publish(u64::MAX, newest, stop).unwrap();
             run.status().is_some_and(|status| {
                 let link = &status["link"];
                 link["ignored_writer"] == u64::from(std::process::id())
@@ -100,9 +98,9 @@ fn a_second_controller_or_supervisor_and_samples_that_seem_newer_are_ignored_and
         let ended = pidfd_open(Pid::from_child(&echo), PidfdFlags::empty()).unwrap();
         assert!(poll::is_readable(&ended, PATIENCE).unwrap(), "the echo ends");
         let (code, shown) = json_of(&echo.wait_with_output().unwrap());
-        let forged = shown.iter().filter(|sample| sample["stamp"]["generation"] != 1);
-        assert_eq!((code, shown.len(), forged.count()), (Some(0), 40, 0));
-        drop((ranges, wheels, pose, grid, guidance, link, commands, orders, bus));
+        let foreign = shown.iter().filter(|sample| sample["stamp"]["generation"] != 1);
+        assert_eq!((code, shown.len(), foreign.count()), (Some(0), 40, 0));
+        drop((forged, commands, orders, bus));
         let (summary, directory) = run.arrives_in();
         let recording = Recording::open(&directory.path().join("run")).unwrap();
         let poses = recording.samples(&topics::POSE).unwrap();
