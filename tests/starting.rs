@@ -32,9 +32,13 @@ fn a_signal_at_any_moment_of_a_start_ends_the_run_with_a_summary_and_leaves_noth
     ends("st-log", &[], |runs| runs.join("open-room-001/supervisor.log").exists());
     ends("st-claim", &[], |_| domain("st-claim").is_supervised());
     ends("st-bus", &[], |_| domain("st-bus").middleware_config().exists());
-    ends("st-robot", &[], |_| process_with("st-robot", "x80-sim.checkpoint").is_some());
-    ends("st-recorder", &[], |_| process_with("st-recorder", "firsthand record").is_some());
-    ends("st-stage", &[], |_| process_with("st-stage", "stage planner").is_some());
+    for (robot, word) in [
+        ("st-robot", "x80-sim.checkpoint"),
+        ("st-recorder", "firsthand record"),
+        ("st-stage", "stage planner"),
+    ] {
+        ends(robot, &[], |_| process_with(robot, word).is_some());
+    }
     // The robot is off.
     let nowhere = ["--set", "robot.address='127.0.0.1:9'"];
     ends("st-off", &nowhere, |_| status_of("st-off").is_some_and(|status| all_run(&status)));
