@@ -82,13 +82,6 @@ fn a_robot_that_moves_scans_waits_or_was_held_is_not_stalled() {
 }
 
 #[test]
-fn a_stalled_robot_gets_a_fresh_planner_twice_then_a_fresh_belief() {
-    let stalls = stalls(&mut watch(), (Along, 3.0), 0..11, standing);
-    let stalls: Vec<_> = stalls.into_iter().map(|it| it.1).collect();
-    assert_eq!(stalls, [(Still, Replan, 0), (Still, Replan, 0), (Still, Reset, 1)]);
-}
-
-#[test]
 fn what_a_robot_did_while_it_was_not_to_drive_is_no_stall() {
     let mut watch = watch();
     let said = |watch: &mut StallWatch, seconds, status| {
@@ -123,23 +116,22 @@ fn an_answer_from_before_the_reset_does_not_reset_again() {
     assert_eq!(step(&mut watch, pose(2.5, 0.1), old), None);
 }
 
-/// Returns the recovery steps of a robot that rocks.
-fn rock(watch: &mut StallWatch, seconds: Range<u32>) -> Vec<RecoveryStep> {
+#[test]
+fn a_robot_that_stands_or_moves_where_it_is_gets_a_fresh_planner_twice_then_a_fresh_belief() {
     let rocking =
         |it: f64| PoseSample { x_m: 0.05 * it.sin(), heading_rad: it, ..pose(it, 0.05 * it) };
-    let stalls = stalls(watch, (Along, 3.0), seconds, rocking);
-    assert!(stalls.iter().all(|it| it.1.0 == Pinned), "{stalls:?}");
-    stalls.into_iter().map(|it| it.1.1).collect()
-}
-
-#[test]
-fn a_robot_that_moves_and_stays_where_it_is_gets_a_fresh_planner_twice_then_a_fresh_belief() {
-    assert_eq!(rock(&mut watch(), 0..60), [Replan, Replan, Reset]);
+    let told = |watch: &mut StallWatch, seconds, moves: fn(f64) -> PoseSample| -> Vec<_> {
+        stalls(watch, (Along, 3.0), seconds, moves).into_iter().map(|it| it.1).collect()
+    };
+    let all = |cause| [(cause, Replan, 0), (cause, Replan, 0), (cause, Reset, 1)];
+    assert_eq!(told(&mut watch(), 0..11, standing), all(Still));
+    assert_eq!(told(&mut watch(), 0..60, rocking), all(Pinned));
     let mut watch = watch();
-    assert_eq!(rock(&mut watch, 0..40), [Replan, Replan]);
+    assert_eq!(told(&mut watch, 0..40, rocking), all(Pinned)[..2]);
     let elsewhere = PoseSample { x_m: 1.0, ..pose(40.0, 3.0) };
     step(&mut watch, elsewhere, guidance(Along, 0));
-    assert_eq!(rock(&mut watch, 41..85), [Replan, Replan], "a place that was left does not count");
+    let again = told(&mut watch, 41..85, rocking);
+    assert_eq!(again, all(Pinned)[..2], "a place that was left does not count");
     assert_eq!(watch.recoveries(None).0, 4);
 }
 
