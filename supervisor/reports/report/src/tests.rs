@@ -79,9 +79,9 @@ fn a_recording_that_is_cut_off_gives_a_report_that_says_so() {
 
 #[test]
 fn metrics_count_every_generation_and_every_sample() {
-    let mut content = golden();
-    content.measured = crate::measured::Measured::default();
-    content.heard = summary::Hearer::default();
+    let mission = golden().mission;
+    let mut measured = crate::measured::Measured::default();
+    let mut heard = summary::Hearer::default();
     let stamp = |tick: u64, generation| Stamp {
         tick,
         stamp_ns: tick * 1_000_000_000,
@@ -91,7 +91,7 @@ fn metrics_count_every_generation_and_every_sample() {
     let mut histogram = Histogram::default();
     histogram.record(1_000_000);
     for (tick, generation) in [(0, 1), (1, 1), (2, 2)] {
-        content.heard.hear(&Heard::Link(&LinkSample {
+        heard.hear(&Heard::Link(&LinkSample {
             stamp: stamp(tick, generation),
             latency_histogram: histogram.counts,
             latency_max_ns: histogram.max_ns,
@@ -99,11 +99,11 @@ fn metrics_count_every_generation_and_every_sample() {
         }));
         let pose =
             PoseSample { stamp: stamp(tick, 1), v_m_s: tick as f64 * 0.5, ..PoseSample::default() };
-        content.measured.pose(&pose, &content.mission);
+        measured.pose(&pose, &mission);
         let range =
             RangeReading { range_m: 0.2, status: u8::from(tick == 0), ..RangeReading::default() };
-        content.measured.range(&range, &content.mission);
-        content.heard.hear(&Heard::Command(&CommandSample {
+        measured.range(&range, &mission);
+        heard.hear(&Heard::Command(&CommandSample {
             stamp: stamp(tick, 1),
             left_rad_s: -1.0,
             right_rad_s: tick as f64,
@@ -113,10 +113,9 @@ fn metrics_count_every_generation_and_every_sample() {
     }
     let mut late = PoseSample { stamp: stamp(2, 1), v_m_s: 900.0, ..PoseSample::default() };
     late.stamp.stamp_ns += 1000;
-    content.measured.pose(&late, &content.mission);
-    let counts: u32 = content.heard.latency().counts.iter().sum();
+    measured.pose(&late, &mission);
+    let counts: u32 = heard.latency().counts.iter().sum();
     assert_eq!(counts, 2);
-    let Content { measured, heard, .. } = content;
     let metrics = [
         measured.speed_change(),
         measured.near(),
