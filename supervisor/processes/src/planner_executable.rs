@@ -75,15 +75,6 @@ mod tests {
     }
 
     #[test]
-    fn another_planner_of_firsthand_is_found_by_its_name() {
-        for named in ["odometry", "wavefront"] {
-            assert_eq!(resolved(Path::new(named)).unwrap(), Path::new(named));
-        }
-        let refused = resolved(Path::new("./odometry")).unwrap_err();
-        assert!(refused.contains("`odometry`, `wavefront`, the path"), "{refused}");
-    }
-
-    #[test]
     fn what_cannot_be_executed_is_refused_by_name_with_what_is_wrong() {
         let folder = tempfile::tempdir().unwrap();
         let plain = folder.path().join("plain");
@@ -94,6 +85,7 @@ mod tests {
             (folder.path(), "is a directory"),
             (&folder.path().join("none"), "No such file"),
             (Path::new("no-such-planner"), "nor on PATH"),
+            (Path::new("./wavefront"), "`odometry`, `wavefront`, the path"),
         ] {
             let said = resolved(named).unwrap_err();
             let name = named.to_str().unwrap();
