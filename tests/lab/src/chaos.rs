@@ -1,9 +1,9 @@
 //! `firsthand bench chaos`: random signals to stages at random times, as a test of the supervisor
 //! through real processes; and faults of robots, each mission in one process.
 //!
-//! Each attacked mission runs twice with one seed: undisturbed, then attacked. It must reach its
-//! target without contact, with about the pose error of the undisturbed run, and leave nothing on
-//! the machine.
+//! Each mission runs twice with one seed: undisturbed in one process, then attacked. It must reach
+//! its target without contact, with about the pose error of the undisturbed run, and leave nothing
+//! on the machine.
 
 mod attack;
 pub mod consumers;

@@ -2,17 +2,15 @@
 
 use std::{
     fs,
-    path::Path,
-    process::Command,
     time::{Duration, Instant},
 };
 
-use common::{clock::Pace, mission::Mission};
+use common::mission::Mission;
 
 use crate::chaos::{
     attack::Attack,
     consumers::Consumers,
-    options::{Arguments, Options},
+    options::Arguments,
     report::Series,
 };
 use crate::{
@@ -22,6 +20,7 @@ use crate::{
 use mission_control::{outcome::Outcome, surroundings::SimulatedRobot as _};
 use processes::DEATHS;
 use serde::Deserialize;
+use simulation::Scenario;
 use summary::Summary;
 
 /// A mission takes half a minute of wall-clock time.
@@ -35,38 +34,25 @@ struct Death {
     hung: bool,
 }
 
-fn command(options: &Options, seed: u64, pace: Pace, out: &Path) -> Command {
-    let Arguments { mission, robot, set, .. } = &options.asked;
-    let mut command = robot::mission("run", mission, robot, set);
-    command.args(["--pace", &pace.to_string(), "--seed", &seed.to_string(), "--out"]).arg(out);
-    command
-}
-
-fn undisturbed(options: &Options, seed: u64) -> Result<Summary> {
-    let directory = options.directory.join("undisturbed");
-    let command = command(options, seed, Pace::Max, &directory);
-    let summary = Run::start(command, &directory, false)?.wait(|| ())?.summary()?;
-    fs::remove_dir_all(directory).or_cannot("remove its directory")?;
-    Ok(summary)
-}
-
 /// Runs the next mission of `series` undisturbed, attacks it, and reports. Keeps its files after a
 /// failure.
 pub fn attack(series: &mut Series<'_>) -> Result {
     let options = series.options;
     let asked = &options.asked;
     let seed = asked.seed + series.report.missions;
-    let undisturbed = undisturbed(options, seed)?;
+    let mission = Mission { seed, ..options.loaded.clone() };
+    let undisturbed = Scenario::lockstep(&mission).run().summary.unwrap_or_default();
     let before = series.report.kills();
     let files = options.directory.join(format!("seed-{seed}"));
     fs::create_dir(&files).or_cannot("make a directory")?;
     let directory = files.join("run");
-    let simulated = || {
-        let mission = Mission { seed, ..options.loaded.clone() };
-        robot::simulated(&files.join("robot"), &mission)
-    };
+    let simulated = || robot::simulated(&files.join("robot"), &mission);
     let mut robot = asked.include_supervisor.then(simulated).transpose()?;
-    let mut start = command(options, seed, asked.pace, &directory);
+    // A robot in its own process needs real time.
+    let pace = if robot.is_some() { "1" } else { "4" };
+    let Arguments { mission: name, robot: robot_name, set, .. } = asked;
+    let mut start = robot::mission("run", name, robot_name, set);
+    start.args(["--pace", pace, "--seed", &seed.to_string(), "--out"]).arg(&directory);
     if let Some(robot) = &robot {
         let address = robot.address();
         start.args(["--set", &format!("robot.address='udp://{address}'")]);

@@ -3,7 +3,7 @@
 use std::{env, fs, path::PathBuf, process};
 
 use clap::Args;
-use common::{clock::Pace, domain::RobotName, mission::Mission};
+use common::{domain::RobotName, mission::Mission};
 use console::missions;
 
 use simulation::RobotFault;
@@ -28,7 +28,7 @@ pub struct Arguments {
     pub include_startup: bool,
     /// Also signal the supervisor, one in twenty signals, and resume its run each time. The robot
     /// then has its own process, and mission time is wall-clock time.
-    #[arg(long, conflicts_with = "pace")]
+    #[arg(long)]
     pub include_supervisor: bool,
     /// Kill and freeze consumers too, one in two signals: a recorder beside the run's own, `topic
     /// hz` and `logs -f`.
@@ -44,9 +44,6 @@ pub struct Arguments {
     /// Record the missions, and replay every generation of every stage, which must be bit-equal.
     #[arg(long)]
     pub replay: bool,
-    /// Speed of mission time: R times wall-clock time.
-    #[arg(long, default_value = "4")]
-    pub pace: Pace,
     /// Set a mission key; repeatable.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
@@ -61,7 +58,7 @@ pub struct Arguments {
     /// each fault to the last moving command and to wheels at rest.
     #[arg(
         long, value_name = "FAULT,...", num_args = 0.., require_equals = true, value_delimiter = ',',
-        conflicts_with_all = ["kills", "include_startup", "include_supervisor", "pace"]
+        conflicts_with_all = ["kills", "include_startup", "include_supervisor"]
     )]
     pub robot_faults: Option<Vec<RobotFault>>,
     /// Number of missions per fault.
@@ -89,17 +86,8 @@ impl Options {
             asked.set.insert(0, "timeout_s=1800".to_owned());
         }
         let loaded = missions::load(&asked.mission, &asked.set)?;
-        if asked.include_supervisor && loaded.robot.address.is_some() {
+        if loaded.robot.address.is_some() {
             return Err("chaos simulates its own robot; remove robot.address".into());
-        }
-        if asked.pace == Pace::Max {
-            return Err(
-                "chaos needs a wall clock; give --pace R, such as 4 for four times real time"
-                    .into(),
-            );
-        }
-        if asked.include_supervisor {
-            asked.pace = Pace::Rate(1.0);
         }
         let name = format!("firsthand-chaos-{}-{}", process::id(), asked.robot);
         let directory = env::temp_dir().join(name);
