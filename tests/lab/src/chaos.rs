@@ -16,17 +16,17 @@ mod robot_faults;
 mod schedule;
 mod stop_time_table;
 
-pub use options::{Arguments, Options};
+pub use options::Arguments;
 
 use std::{fs, process::ExitCode, time::Instant};
 
 use console::{
     missions,
-    output::{print_rows, write_stderr},
+    output::{print_rows, say, write_stderr},
 };
 
 use crate::error::{OrCannot as _, Result};
-use report::{Report, Series};
+use report::Series;
 
 /// Exit code after a failed mission or a faulty robot that stopped late.
 const NOT_CLEAN: u8 = 8;
@@ -48,34 +48,31 @@ fn judge(arguments: &Arguments) -> Result<bool> {
         print_rows(&[&table], arguments.json, table.text())?;
         return Ok(table.is_kept());
     }
-    let options = Options::of(arguments)?;
-    let directory = options.directory.display();
-    let report = match run(&options) {
-        Ok(report) => report,
-        Err(error) if fs::remove_dir(&options.directory).is_ok() => return Err(error),
-        Err(error) => return Err(format!("{error}; see {directory}").into()),
-    };
+    let began = Instant::now();
+    let mut series = Series::new(arguments)?;
+    let ran = run(&mut series);
+    let Series { directory, mut report, .. } = series;
+    let see = format!("see {}", directory.display());
+    ran.map_err(|error| format!("{error}; {see}"))?;
+    report.took_s = began.elapsed().as_secs_f64();
     let is_clean = report.wrong.is_empty() && report.leftovers.is_empty();
     if is_clean {
-        fs::remove_dir_all(&options.directory)?;
+        fs::remove_dir_all(&directory)?;
     } else {
-        write_stderr(&format!("firsthand: the files of the failed missions are in {directory}\n"));
+        say(format_args!("missions failed; {see}"));
     }
     print_rows(&[&report], arguments.json, crate::text(&report))?;
     Ok(is_clean)
 }
 
-fn run(options: &Options) -> Result<Report> {
-    let began = Instant::now();
-    let mut series = Series::new(options)?;
+fn run(series: &mut Series) -> Result {
     while !series.is_over() {
-        mission::attack(&mut series)?;
-        let left = leftovers::find(&options.asked.robot, &options.directory);
-        let Report { signals, missions, leftovers, .. } = &mut series.report;
-        leftovers.extend(left.iter().map(|what| format!("after mission {missions}: {what}")));
-        let kills = options.asked.kills;
-        write_stderr(&format!("{signals} of {kills} signals, {missions} missions\n"));
+        mission::attack(series)?;
+        let Series { asked, directory, report, .. } = series;
+        let left = leftovers::find(&asked.robot, directory);
+        let (signals, missions) = (report.signals, report.missions);
+        report.leftovers.extend(left.iter().map(|it| format!("after mission {missions}: {it}")));
+        write_stderr(&format!("{signals} of {} signals, {missions} missions\n", asked.kills));
     }
-    series.report.took_s = began.elapsed().as_secs_f64();
-    Ok(series.report)
+    Ok(())
 }

@@ -5,12 +5,9 @@ use std::time::{Duration, Instant};
 use common::{
     bus::{AnyReader, AnyTopic, Bus, BusError, Reader},
     clock::MissionTime,
-    ground_truth::GroundTruthTick,
+    domain::RobotName,
     roster::Roster,
-    samples::{
-        DeathSample, HealthSample, HealthState, Order, PoseSample, RosterEntry, StageState,
-        name_str,
-    },
+    samples::{DeathSample, HealthSample, HealthState, Order, RosterEntry, StageState, name_str},
     topics::{self, SUPERVISOR},
 };
 use mission_control::{simulator::Simulator, surroundings::SimulatedRobot as _};
@@ -22,7 +19,6 @@ use rustix::process::{Pid, Signal, kill_process};
 
 use super::{
     consumers::Consumers,
-    options::Options,
     report::{Row, Series, ms_since},
     schedule::Kind,
 };
@@ -39,14 +35,12 @@ pub struct Attack {
     time: Option<MissionTime>,
     pub consumers: Consumers,
     entries: Vec<RosterEntry>,
-    entries_read: Option<Instant>,
     supervisor: u32,
     /// Whether later samples of the supervisor and its stages are no sign of its successor.
     supervisor_hit: bool,
     driving: bool,
     sent: Vec<Sent>,
     kept: usize,
-    pose: Option<PoseSample>,
 }
 
 struct Sent {
@@ -65,7 +59,7 @@ impl Attack {
     /// Attacks one generation of the supervisor, `child`, until it ends, for at most `patience`.
     pub fn run(
         &mut self,
-        series: &mut Series<'_>,
+        series: &mut Series,
         child: &mut Process,
         mut robot: Option<&mut Simulator>,
         patience: Duration,
@@ -81,7 +75,7 @@ impl Attack {
         while child.try_reap().or_cannot("reap")?.is_none() && began.elapsed() < patience {
             self.consumers.maintain(&mut series.report)?;
             let Some((subscriptions, next)) = &mut joined else {
-                match Subscriptions::join(series.options, child.id()) {
+                match Subscriptions::join(&series.asked.robot, child.id()) {
                     Ok(Some(found)) => {
                         joined = Some((found, Instant::now() + series.schedule.pause()));
                     }
@@ -90,12 +84,8 @@ impl Attack {
                 continue;
             };
             // An overdue hit waits until the robot drives.
-            let due = next.checked_duration_since(Instant::now());
-            let startup_hit = self.next_startup_hit();
-            let startup_hit =
-                startup_hit.map_or(POLL, |(at, _)| at.saturating_duration_since(Instant::now()));
-            let timeout = due.unwrap_or(POLL).min(startup_hit);
-            subscriptions.roster.waiter.wait(timeout.min(POLL))?;
+            let due = next.checked_duration_since(Instant::now()).unwrap_or(POLL);
+            subscriptions.roster.waiter.wait(due.min(POLL))?;
             if let Some(robot) = &mut robot {
                 robot.poll()?;
             }
@@ -111,16 +101,15 @@ impl Attack {
         Ok(())
     }
 
-    fn keep_rows(&mut self, series: &mut Series<'_>) -> Result {
-        let left = self.sent.iter().skip(self.kept);
-        for sent in left.take_while(|sent| !sent.pending) {
+    fn keep_rows(&mut self, series: &mut Series) -> Result {
+        while let Some(sent) = self.sent.get(self.kept).filter(|sent| !sent.pending) {
             series.keep(sent.row.clone())?;
             self.kept += 1;
         }
         Ok(())
     }
 
-    pub fn end(&mut self, series: &mut Series<'_>) -> Result {
+    pub fn end(&mut self, series: &mut Series) -> Result {
         self.consumers.end();
         self.sent.iter_mut().for_each(|sent| sent.pending = false);
         self.keep_rows(series)
@@ -128,7 +117,7 @@ impl Attack {
 
     fn note(
         &mut self,
-        series: &mut Series<'_>,
+        series: &mut Series,
         (stage, generation): (&str, Option<u32>),
         kind: Kind,
         pending: bool,
@@ -162,12 +151,6 @@ impl Attack {
         })
     }
 
-    pub fn pose_error(&self, truth: &[GroundTruthTick]) -> Option<f64> {
-        let pose = self.pose?;
-        let tick = truth.iter().rfind(|tick| tick.is_of(&pose))?;
-        Some(tick.pose_error_m(&pose))
-    }
-
     fn read(&mut self, subscriptions: &mut Subscriptions) -> Result {
         while let Some(death) = subscriptions.deaths.next_sample()? {
             if let Some(Sent { row, at, .. }) = self.pending(name_str(&death.stage))
@@ -180,7 +163,6 @@ impl Attack {
             self.driving = entries.header().order() == Order::Drive;
             self.supervisor = entries.header().supervisor_pid;
             self.entries = entries.to_vec();
-            self.entries_read = Some(Instant::now());
             if self.driving {
                 self.on_sign(SUPERVISOR, 0, true);
             }
@@ -189,10 +171,6 @@ impl Attack {
             if health.state() == HealthState::Ready {
                 self.on_sign(name_str(&health.stage), health.stamp.generation, true);
             }
-        }
-        while let Some(sample) = subscriptions.pose.next_sample()? {
-            self.on_sign(topics::POSE.spec().writer, sample.stamp.generation, false);
-            self.pose = Some(sample);
         }
         for (writer, reader) in &mut subscriptions.outputs {
             while let Some((_, stamp)) = reader.next_stamp()? {
@@ -219,16 +197,13 @@ impl Attack {
         }
     }
 
-    fn freeze_all(&mut self, pause: Duration, series: &mut Series<'_>) {
-        // The supervisor freezes first and thaws last, so that it never sees frozen stages.
-        let mut all = vec![self.supervisor];
-        for RosterEntry { stage, generation, pid, .. } in &self.entries {
-            // A stage frozen alone stays frozen.
-            if !self.was_frozen(name_str(stage), *generation) {
-                all.push(*pid);
-            }
-        }
-        all.retain(|&process| send(process, Signal::STOP));
+    fn freeze_all(&mut self, pause: Duration, series: &mut Series) {
+        // The supervisor freezes first and thaws last, so that it never sees frozen stages. A stage
+        // frozen alone stays frozen.
+        let thaws = |it: &&RosterEntry| !self.was_frozen(name_str(&it.stage), it.generation);
+        let stages = self.entries.iter().filter(thaws).map(|entry| entry.pid);
+        let all = [self.supervisor].into_iter().chain(stages);
+        let all: Vec<_> = all.filter(|&process| send(process, Signal::STOP)).collect();
         let began = Instant::now();
         std::thread::sleep(pause);
         for process in all.into_iter().rev() {
@@ -241,9 +216,8 @@ impl Attack {
         self.note(series, ("everything", None), Kind::FreezeAll, false);
     }
 
-    fn hit(&mut self, series: &mut Series<'_>) -> Result {
-        let Series { options, schedule, report, .. } = series;
-        let asked = &options.asked;
+    fn hit(&mut self, series: &mut Series) -> Result {
+        let Series { asked, schedule, report, .. } = series;
         if let Some((index, kind, pause)) = schedule.consumer(self.consumers.len()) {
             if let Some((name, starts)) = self.consumers.hit(index, kind, pause, report)? {
                 self.note(series, (&name, Some(starts)), kind, false);
@@ -260,8 +234,9 @@ impl Attack {
         {
             self.freeze_all(pause, series);
         } else {
-            let (stage, kind, startup_hit) =
-                (schedule.stage(), schedule.kind(), schedule.startup_hit());
+            let (stage, kind) = (schedule.stage(), schedule.kind());
+            let is_followed = asked.include_startup && kind != Kind::Freeze;
+            let startup_hit = schedule.startup_hit().filter(|_| is_followed);
             let running = |entry: &&RosterEntry| {
                 name_str(&entry.stage) == stage && entry.state() == StageState::Running
             };
@@ -272,10 +247,7 @@ impl Attack {
                 && send(pid, kind.signal())
             {
                 self.note(series, (stage, Some(generation)), kind, true);
-                if asked.include_startup
-                    && kind != Kind::Freeze
-                    && let Some(sent) = self.pending(stage)
-                {
+                if let Some(sent) = self.pending(stage) {
                     sent.startup_hit = startup_hit;
                 }
             }
@@ -283,32 +255,20 @@ impl Attack {
         Ok(())
     }
 
-    /// Returns the time and process of the next start-up hit.
-    fn next_startup_hit(&self) -> Option<(Instant, RosterEntry)> {
-        let read = self.entries_read?;
-        let pending = self.sent.iter().filter(|sent| sent.pending);
-        let hits = pending.filter_map(|Sent { row, startup_hit, .. }| {
-            let entry = self.entries.iter().find(|entry| {
-                name_str(&entry.stage) == row.stage
-                    && Some(entry.generation) > row.generation
-                    && entry.pid != 0
-            })?;
-            let age = Duration::from_nanos(entry.uptime_ns);
-            Some((read + (*startup_hit)?.saturating_sub(age), *entry))
-        });
-        hits.min_by_key(|hit| hit.0)
-    }
-
-    fn hit_starting(&mut self, series: &mut Series<'_>) {
-        while let Some((at, entry)) = self.next_startup_hit()
-            && at <= Instant::now()
-            && let Some(sent) = self.pending(name_str(&entry.stage))
-        {
-            sent.startup_hit = None;
-            if send(entry.pid, Signal::KILL) {
-                sent.pending = false;
-                let hit = (name_str(&entry.stage), Some(entry.generation));
-                self.note(series, hit, Kind::KillAtStart, true);
+    /// Kills successors within their first milliseconds.
+    fn hit_starting(&mut self, series: &mut Series) {
+        for entry in self.entries.clone() {
+            let stage = name_str(&entry.stage);
+            if let Some(sent) = self.pending(stage)
+                && Some(entry.generation) > sent.row.generation
+                && entry.pid != 0
+                && let Some(age) = sent.startup_hit.take()
+            {
+                std::thread::sleep(age.saturating_sub(Duration::from_nanos(entry.uptime_ns)));
+                if send(entry.pid, Signal::KILL) {
+                    sent.pending = false;
+                    self.note(series, (stage, Some(entry.generation)), Kind::KillAtStart, true);
+                }
             }
         }
     }
@@ -322,28 +282,26 @@ struct Subscriptions {
     roster: Roster,
     deaths: Reader<DeathSample>,
     health: Reader<HealthSample>,
-    pose: Reader<PoseSample>,
     outputs: Vec<(&'static str, Box<dyn AnyReader>)>,
 }
 
 impl Subscriptions {
     /// Joins the bus of `supervisor`; none for another's. A killed supervisor leaves its bus until
     /// its successor removes it.
-    fn join(options: &Options, supervisor: u32) -> Result<Option<Self>> {
-        let bus = Bus::join(&options.asked.robot.domain(), "chaos")?;
+    fn join(robot: &RobotName, supervisor: u32) -> Result<Option<Self>> {
+        let bus = Bus::join(&robot.domain(), "chaos")?;
         let mut roster = Roster::open(&bus)?;
         let wakes: [&dyn AnyTopic; 3] = [&topics::DEATHS, &topics::HEALTH, &topics::COMMAND];
         for topic in wakes {
             roster.waiter.on(bus.wakeup(topic)?);
         }
-        let outputs: [&dyn AnyTopic; 4] =
-            [&topics::WHEELS, &topics::GRID, &topics::GUIDANCE, &topics::COMMAND];
+        let outputs: [&dyn AnyTopic; 5] =
+            [&topics::WHEELS, &topics::POSE, &topics::GRID, &topics::GUIDANCE, &topics::COMMAND];
         let outputs = outputs.iter().map(|it| Ok((it.spec().writer, it.any_reader(&bus)?)));
         let mut subscriptions = Self {
             roster,
             deaths: bus.reader(&topics::DEATHS)?,
             health: bus.reader(&topics::HEALTH)?,
-            pose: bus.reader(&topics::POSE)?,
             outputs: outputs.collect::<Result<_, BusError>>()?,
         };
         let found = subscriptions.roster.find(2 * topics::RESTATE, |header, _| {

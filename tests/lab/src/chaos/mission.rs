@@ -7,17 +7,12 @@ use std::{
 
 use common::mission::Mission;
 
-use crate::chaos::{
-    attack::Attack,
-    consumers::Consumers,
-    options::Arguments,
-    report::Series,
-};
+use crate::chaos::{attack::Attack, consumers::Consumers, options::Arguments, report::Series};
 use crate::{
     error::{OrCannot as _, Result},
     robot::{self, Run, firsthand},
 };
-use mission_control::{outcome::Outcome, surroundings::SimulatedRobot as _};
+use mission_control::{outcome::Outcome, recovery, surroundings::SimulatedRobot as _};
 use processes::DEATHS;
 use serde::Deserialize;
 use simulation::Scenario;
@@ -36,21 +31,20 @@ struct Death {
 
 /// Runs the next mission of `series` undisturbed, attacks it, and reports. Keeps its files after a
 /// failure.
-pub fn attack(series: &mut Series<'_>) -> Result {
-    let options = series.options;
-    let asked = &options.asked;
-    let seed = asked.seed + series.report.missions;
-    let mission = Mission { seed, ..options.loaded.clone() };
+pub fn attack(series: &mut Series) -> Result {
+    let seed = series.asked.seed + series.report.missions;
+    let mission = Mission { seed, ..series.loaded.clone() };
     let undisturbed = Scenario::lockstep(&mission).run().summary.unwrap_or_default();
     let before = series.report.kills();
-    let files = options.directory.join(format!("seed-{seed}"));
+    let files = series.directory.join(format!("seed-{seed}"));
     fs::create_dir(&files).or_cannot("make a directory")?;
     let directory = files.join("run");
     let simulated = || robot::simulated(&files.join("robot"), &mission);
-    let mut robot = asked.include_supervisor.then(simulated).transpose()?;
+    let Arguments { mission: name, robot: robot_name, set, .. } = &series.asked;
+    let (replays, hits_recorders) = (series.asked.replay, series.asked.include_consumers);
+    let mut robot = series.asked.include_supervisor.then(simulated).transpose()?;
     // A robot in its own process needs real time.
     let pace = if robot.is_some() { "1" } else { "4" };
-    let Arguments { mission: name, robot: robot_name, set, .. } = asked;
     let mut start = robot::mission("run", name, robot_name, set);
     start.args(["--pace", pace, "--seed", &seed.to_string(), "--out"]).arg(&directory);
     if let Some(robot) = &robot {
@@ -58,11 +52,11 @@ pub fn attack(series: &mut Series<'_>) -> Result {
         start.args(["--set", &format!("robot.address='udp://{address}'")]);
     }
     let consumers = files.join("consumers");
-    let consumers = Consumers::start(asked, consumers, &mut series.report)?;
+    let consumers = Consumers::start(&series.asked, consumers, &mut series.report)?;
     let mut attack = Attack::new(seed, consumers);
     let began = Instant::now();
     let summary = loop {
-        let mut run = Run::start(start, &directory, asked.replay || asked.include_consumers)?;
+        let mut run = Run::start(start, &directory, replays || hits_recorders)?;
         let attacked = attack.run(series, &mut run.process, robot.as_mut(), PATIENCE);
         run.process.end(Duration::from_secs(2));
         attacked?;
@@ -81,9 +75,11 @@ pub fn attack(series: &mut Series<'_>) -> Result {
     let mut excess_m = summary.pose_error_m.unwrap_or_default();
     if let Some(robot) = &mut robot {
         robot.stop()?;
-        let truth = robot.truth();
-        collisions = truth.last().map_or(0, |tick| tick.contacts);
-        excess_m = attack.pose_error(truth).unwrap_or(f64::INFINITY);
+        let truth = robot.truth().last().copied().unwrap_or_default();
+        collisions = truth.contacts;
+        let place = recovery::last_place(&directory, &mission);
+        excess_m = place
+            .map_or(f64::INFINITY, |(place, _)| (place.x_m - truth.x).hypot(place.y_m - truth.y));
     }
     excess_m -= undisturbed.pose_error_m.unwrap_or_default();
     report.missions += 1;
@@ -103,15 +99,15 @@ pub fn attack(series: &mut Series<'_>) -> Result {
     wrong.extend(aborted.map(|Death { stage, generation, .. }| {
         format!("healthy stage aborted: {stage} generation {generation}")
     }));
-    let allowance_m = pose_allowance_m(&options.loaded, kills, &summary);
+    let allowance_m = pose_allowance_m(&mission, kills, &summary);
     if excess_m > allowance_m {
         wrong.push(format!(
             "pose error {excess_m:.4} m above the undisturbed run; the allowance is {allowance_m:.4} m"
         ));
     }
-    if asked.replay {
+    if replays {
         let replays = report.replays.get_or_insert_default();
-        replays.add(&directory, asked.include_consumers, &attack.consumers, &mut wrong);
+        replays.add(&directory, hits_recorders, &attack.consumers, &mut wrong);
     }
     if wrong.is_empty() {
         fs::remove_dir_all(&files).or_cannot("remove its directory")?;

@@ -1,15 +1,12 @@
 //! Attacked mission, and kinds of attack.
 
-use std::{env, fs, path::PathBuf, process};
+use std::path::PathBuf;
 
 use clap::Args;
-use common::{domain::RobotName, mission::Mission};
-use console::missions;
-
+use common::domain::RobotName;
 use simulation::RobotFault;
 
 use super::consumers::Consumer;
-use crate::error::{OrCannot as _, Result};
 
 /// Send random signals to random stages at random times, mission after mission, and report.
 #[derive(Clone, Debug, Args)]
@@ -67,31 +64,4 @@ pub struct Arguments {
     /// Print one line of JSON.
     #[arg(long)]
     pub json: bool,
-}
-
-pub struct Options {
-    pub asked: Arguments,
-    pub loaded: Mission,
-    /// Parent of the run directories, emptied after each mission.
-    pub directory: PathBuf,
-}
-
-impl Options {
-    /// Creates a new directory for the missions. Fails for an unsuitable mission or conflicting
-    /// options.
-    pub fn of(asked: &Arguments) -> Result<Self> {
-        let mut asked = asked.clone();
-        if asked.freeze_all {
-            // The robot's clock continues during a freeze. A user's --set comes later and wins.
-            asked.set.insert(0, "timeout_s=1800".to_owned());
-        }
-        let loaded = missions::load(&asked.mission, &asked.set)?;
-        if loaded.robot.address.is_some() {
-            return Err("chaos simulates its own robot; remove robot.address".into());
-        }
-        let name = format!("firsthand-chaos-{}-{}", process::id(), asked.robot);
-        let directory = env::temp_dir().join(name);
-        fs::create_dir(&directory).or_cannot_file("make", &directory)?;
-        Ok(Self { asked, loaded, directory })
-    }
 }

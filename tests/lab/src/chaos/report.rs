@@ -2,13 +2,20 @@
 //!
 //! A row is written once its signal and all earlier ones are measured.
 
-use std::{collections::BTreeMap, fs, path::Path, time::Instant};
+use std::{
+    collections::BTreeMap,
+    env, fs,
+    path::{Path, PathBuf},
+    process,
+    time::Instant,
+};
 
-use common::latency::Histogram;
+use common::{latency::Histogram, mission::Mission};
+use console::missions;
 use serde::{Deserialize, Serialize, Serializer};
 
 use super::{
-    options::Options,
+    options::Arguments,
     replays::Replays,
     schedule::{Kind, Schedule},
 };
@@ -64,21 +71,34 @@ struct Recovery {
     output: Histogram,
 }
 
-pub struct Series<'a> {
-    pub options: &'a Options,
+pub struct Series {
+    pub asked: Arguments,
+    pub loaded: Mission,
+    /// Parent of the run directories, emptied after each mission.
+    pub directory: PathBuf,
     pub schedule: Schedule,
     pub report: Report,
     signals: Table<Row>,
 }
 
-impl<'a> Series<'a> {
-    pub fn new(options: &'a Options) -> Result<Self> {
-        Ok(Self {
-            options,
-            schedule: Schedule::new(options.asked.seed),
-            report: Report::default(),
-            signals: create(options.asked.out.as_ref().unwrap_or(&options.directory))?,
-        })
+impl Series {
+    /// Creates a new directory for the missions. Fails for an unsuitable mission.
+    pub fn new(asked: &Arguments) -> Result<Self> {
+        let mut asked = asked.clone();
+        if asked.freeze_all {
+            // The robot's clock continues during a freeze. A user's --set comes later and wins.
+            asked.set.insert(0, "timeout_s=1800".to_owned());
+        }
+        let loaded = missions::load(&asked.mission, &asked.set)?;
+        if loaded.robot.address.is_some() {
+            return Err("chaos simulates its own robot; remove robot.address".into());
+        }
+        let name = format!("firsthand-chaos-{}-{}", process::id(), asked.robot);
+        let directory = env::temp_dir().join(name);
+        let signals = create(asked.out.as_ref().unwrap_or(&directory))?;
+        fs::create_dir_all(&directory).or_cannot_file("make", &directory)?;
+        let schedule = Schedule::new(asked.seed);
+        Ok(Self { asked, loaded, directory, schedule, report: Report::default(), signals })
     }
 
     pub fn keep(&mut self, row: Row) -> Result {
@@ -87,7 +107,7 @@ impl<'a> Series<'a> {
     }
 
     pub fn is_over(&self) -> bool {
-        self.report.signals >= self.options.asked.kills
+        self.report.signals >= self.asked.kills
     }
 }
 
