@@ -80,6 +80,11 @@ impl GroundTruthTick {
         self.left_counts == pose.left_counts && self.right_counts == pose.right_counts
     }
 
+    /// Returns the speed of the faster wheel's rim.
+    pub fn rim_m_s(&self, track_m: f64) -> f64 {
+        self.v.abs() + self.omega.abs() * track_m / 2.0
+    }
+
     pub fn pose_error_m(&self, pose: &PoseSample) -> f64 {
         (pose.x_m - self.x).hypot(pose.y_m - self.y)
     }

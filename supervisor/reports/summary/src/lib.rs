@@ -261,15 +261,14 @@ fn straight_m(mission: &Mission, targets: &[TargetResult]) -> f64 {
 }
 
 /// Uses square roots, identical on every processor, unlike the C library's `hypot`.
-fn path_length(truth: &[GroundTruthTick]) -> f64 {
+pub fn path_length(truth: &[GroundTruthTick]) -> f64 {
     let legs = truth.windows(2).map(|pair| [0, 1].map(|at| pair[at].pose().position));
     legs.map(|[from, to]| from.distance(to)).sum()
 }
 
 fn contact_speed_m_s(truth: &[GroundTruthTick], track_m: f64) -> Option<f64> {
     let first = truth.iter().position(|tick| tick.contacts > 0)?;
-    let before = truth.get(first.checked_sub(1)?)?;
-    Some(before.v.abs() + before.omega.abs() * track_m / 2.0)
+    Some(truth.get(first.checked_sub(1)?)?.rim_m_s(track_m))
 }
 
 fn near_share(truth: &[GroundTruthTick]) -> Option<f64> {

@@ -5,15 +5,15 @@ use std::time::Duration;
 use clap::ValueEnum as _;
 use common::{ground_truth::GroundTruthTick, mission::Mission};
 use console::output::write_stderr;
-use mission_control::outcome::RIGHT_PLACE_M;
-use simulation::{Disturbance, Lie, Random, Request, RobotFault, Scenario, What};
+use mission_control::outcome::{Outcome, RIGHT_PLACE_M};
+use simulation::{Disturbance, Lie, Ran, Random, Request, RobotFault, Scenario, What};
 use summary::Summary;
 
 use super::stop_time_table::{Entry, StopTimeTable};
 use crate::{error::Result, simulate::quietly};
 
-/// Least time from the departure to the fault, and width of the random range.
-const FAULT_AFTER_S: (f64, f64) = (1.0, 4.0);
+/// Range of the time from the departure to the fault.
+const FAULT_AFTER_S: [f64; 2] = [1.0, 5.0];
 /// Watch time of a faulty robot: several times as long as it may move.
 const WATCHED: Duration = Duration::from_secs(10);
 /// Watch time of a faulty robot that may go on: until arrival, when it can report a wrong place.
@@ -41,24 +41,29 @@ pub fn run(
         write_stderr(&format!("skipped: {left_out}\n"));
     }
     let _quiet = quietly();
-    let mut table = StopTimeTable::default();
     // Until its fault, each robot drives as the healthy one of its seed.
-    let seeds = (0..u64::from(missions)).map(|number| seed + number);
-    let healthy: Vec<_> = seeds.map(|seed| Healthy::drive(mission, seed)).collect();
+    let healthy: Vec<_> = (seed..)
+        .take(missions as usize)
+        .map(|seed| {
+            let scenario = Scenario::calm(&Mission { seed, ..mission.clone() });
+            let truth = scenario.run().truth;
+            (scenario, truth)
+        })
+        .collect();
+    let mut table = StopTimeTable::default();
     for fault in faults {
-        table.entries.extend(healthy.iter().map(|healthy| one(healthy, fault)));
+        table.entries.extend(healthy.iter().map(|(scenario, truth)| one(scenario, truth, fault)));
     }
     Ok(table)
 }
 
-fn one(healthy: &Healthy, fault: RobotFault) -> Entry {
-    let mut scenario = healthy.scenario.clone();
-    let at = match fault {
-        RobotFault::LateFromBoot => Some(Duration::ZERO),
-        _ => healthy.onset(fault),
-    };
-    let promised_s = fault.row().rest_within_s(&scenario.mission);
+/// Runs the scenario of a healthy robot again, with a fault.
+fn one(healthy: &Scenario, healthy_truth: &[GroundTruthTick], fault: RobotFault) -> Entry {
+    let mission = &healthy.mission;
+    let at = onset(healthy, healthy_truth, fault);
+    let promised_s = fault.row().rest_within_s(mission);
     let watched = if promised_s.is_some() { WATCHED } else { WATCHED_ON_ITS_WAY };
+    let mut scenario = healthy.clone();
     if let Some(at) = at {
         let mut add = |at, what| scenario.disturbances.push(Disturbance { at, what });
         add(at, What::Fault(Some(fault)));
@@ -67,92 +72,67 @@ fn one(healthy: &Healthy, fault: RobotFault) -> Entry {
         }
         add(at + watched, What::End);
     }
-    let ran = scenario.run();
-    let Scenario { seed, mission, .. } = &scenario;
-    let truth = &ran.truth;
-    let (mut outcome, mut reason) = match ran.finished {
-        Some(finished) => (finished.ending.outcome.as_str(), finished.ending.reason),
-        None => {
-            let cause = ran.causes.last().and_then(|(_, cause)| *cause);
+    let Ran { summary, broken, simulated, truth, moved, causes, .. } = scenario.run();
+    let off_m = from_target_m(mission, &truth);
+    let (outcome, mut reason) = match (broken, summary) {
+        (Some(broken), _) => ("broken", broken.to_string()),
+        (None, Some(Summary { mut outcome, reason, pose_within_m, .. })) => {
+            if outcome == Outcome::Reached && off_m > RIGHT_PLACE_M {
+                // A robot that does not trust its pose has not said where it is.
+                let is_unsure = pose_within_m > Some(mission.sure_within_m);
+                outcome = if is_unsure { Outcome::ReachedUnsure } else { Outcome::WrongPlace };
+            }
+            (outcome.as_str(), reason)
+        }
+        (None, None) => {
+            let cause = causes.last().and_then(|(_, cause)| *cause);
             ("goes on", cause.map_or("", |cause| cause.name()).to_owned())
         }
     };
-    let off_m = off_m(mission, truth);
-    if outcome == "reached" && off_m > Some(RIGHT_PLACE_M) {
-        outcome = "wrong_place";
-    }
-    // A robot that does not trust its pose has not said where it is.
-    let is_unsure = |summary: Summary| summary.pose_within_m > Some(mission.sure_within_m);
-    if outcome == "wrong_place" && ran.summary.is_some_and(is_unsure) {
-        outcome = "reached_unsure";
-    }
-    if let Some(broken) = ran.broken {
-        (outcome, reason) = ("broken", broken.to_string());
-    }
-    let began_s = at.unwrap_or(ran.simulated).as_secs_f64();
-    // The tick before the fault counts as its start.
-    let first = truth.partition_point(|tick| tick.time_s < began_s);
-    let watched = &truth[first.saturating_sub(1)..];
-    let ways = watched.windows(2).map(|two| (two[1].x - two[0].x).hypot(two[1].y - two[0].y));
-    let track_m = mission.body().track_m;
-    let is_at_rest = |tick: &GroundTruthTick| {
-        tick.v.abs() + tick.omega.abs() * track_m / 2.0 < GroundTruthTick::AT_REST_M_S
-    };
-    let turning = watched.iter().skip(1).rfind(|tick| !is_at_rest(tick));
-    let contacts = |tick: Option<&GroundTruthTick>| tick.map_or(0, |tick| tick.contacts);
-    let since = |then: Option<f64>| then.map_or(0.0, |then_s| (then_s - began_s).max(0.0));
     if fault == RobotFault::Drawn {
         // Uncalibrated wheels alone may lead that far.
-        let [off_m, healthy_m] = [off_m, healthy.off_m].map(Option::unwrap_or_default);
+        let healthy_m = from_target_m(mission, healthy_truth);
         let lie = Lie::draw(mission);
         reason = format!("{lie}: {off_m:.2} m off, {healthy_m:.2} m without it: {reason}");
     }
+    let began_s = at.unwrap_or(simulated).as_secs_f64();
+    let since = |then_s: f64| (then_s - began_s).max(0.0);
+    // The tick before the fault counts as its start.
+    let first = truth.partition_point(|tick| tick.time_s < began_s);
+    let watched = &truth[first.saturating_sub(1)..];
+    let [start, end] =
+        [watched.first(), watched.last()].map(|tick| tick.copied().unwrap_or_default());
+    let track_m = mission.body().track_m;
+    let turns = |tick: &&GroundTruthTick| tick.rim_m_s(track_m) >= GroundTruthTick::AT_REST_M_S;
+    let turned_s = watched.iter().skip(1).rfind(turns).map_or(0.0, |tick| tick.time_s);
     Entry {
         fault,
-        seed: *seed,
+        seed: scenario.seed,
         promised_s,
-        fault_began: at.is_some(),
-        last_moving_s: at.map(|_| since(ran.moved.map(|moved| moved.as_secs_f64()))),
-        rest_s: at.map(|_| since(turning.map(|tick| tick.time_s))),
-        way_m: ways.sum(),
-        watched_s: since(watched.last().map(|tick| tick.time_s)),
-        collisions: contacts(watched.last()).saturating_sub(contacts(watched.first())),
+        last_moving_s: at.map(|_| since(moved.unwrap_or_default().as_secs_f64())),
+        rest_s: at.map(|_| since(turned_s)),
+        way_m: summary::path_length(watched),
+        watched_s: since(end.time_s),
+        collisions: end.contacts.saturating_sub(start.contacts),
         outcome,
         reason,
     }
 }
 
 /// Returns the distance of the last place from the target.
-fn off_m(mission: &Mission, truth: &[GroundTruthTick]) -> Option<f64> {
-    let last = truth.last()?;
-    Some((last.x - mission.target.x).hypot(last.y - mission.target.y))
+fn from_target_m(mission: &Mission, truth: &[GroundTruthTick]) -> f64 {
+    truth.last().map_or(0.0, |tick| mission.target.distance(tick.pose().position))
 }
 
-struct Healthy {
-    scenario: Scenario,
-    departed_s: Option<f64>,
-    ended_s: f64,
-    off_m: Option<f64>,
-}
-
-impl Healthy {
-    fn drive(mission: &Mission, seed: u64) -> Self {
-        let scenario = Scenario::calm(&Mission { seed, ..mission.clone() });
-        let truth = scenario.run().truth;
-        let departed_s = summary::departed_s(mission, &truth);
-        let ended_s = truth.last().map_or(0.0, |tick| tick.time_s);
-        let off_m = off_m(mission, &truth);
-        Self { scenario, departed_s, ended_s, off_m }
+/// Draws the time of the fault, a while after the departure. Returns `None` if the mission of the
+/// healthy robot ends before.
+fn onset(healthy: &Scenario, truth: &[GroundTruthTick], fault: RobotFault) -> Option<Duration> {
+    if fault == RobotFault::LateFromBoot {
+        return Some(Duration::ZERO);
     }
-
-    /// Draws the time of the fault, a while after the departure. Returns `None` if the mission ends
-    /// before.
-    fn onset(&self, fault: RobotFault) -> Option<Duration> {
-        let (least, more) = FAULT_AFTER_S;
-        let after_s = least + more * Random::new(self.scenario.seed, 17 + fault as u128).share();
-        let at_s = self.departed_s? + after_s;
-        (at_s < self.ended_s).then(|| Duration::from_secs_f64(at_s))
-    }
+    let after_s = Random::new(healthy.seed, 17 + fault as u128).in_range(FAULT_AFTER_S);
+    let at_s = summary::departed_s(&healthy.mission, truth)? + after_s;
+    (at_s < truth.last()?.time_s).then(|| Duration::from_secs_f64(at_s))
 }
 
 #[cfg(test)]

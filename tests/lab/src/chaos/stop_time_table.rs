@@ -31,11 +31,9 @@ pub struct Entry {
     pub seed: u64,
     /// Maximum of `last_moving_s` and `rest_s`; none if the robot may go on.
     pub promised_s: Option<f64>,
-    /// Whether the fault began: the mission may end earlier.
-    pub fault_began: bool,
-    /// Last command that moves a wheel.
+    /// Last command that moves a wheel; none if the mission ended before the fault.
     pub last_moving_s: Option<f64>,
-    /// Last tick with a turning wheel, by the ground truth.
+    /// Last tick with a turning wheel, by the ground truth; none as above.
     pub rest_s: Option<f64>,
     pub way_m: f64,
     pub watched_s: f64,
@@ -49,14 +47,17 @@ pub struct Entry {
 
 impl Entry {
     pub fn is_kept(&self) -> bool {
-        let unharmed = self.fault_began && self.collisions == 0 && self.outcome != "wrong_place";
-        let Some(limit_s) = self.promised_s else {
-            let rests =
-                self.rest_s.is_some_and(|rest_s| rest_s + AT_REST_BEFORE_S <= self.watched_s);
-            return unharmed && (rests || self.fault.row().promise != Promise::EndsAtRest);
+        let (Some(last_moving_s), Some(rest_s)) = (self.last_moving_s, self.rest_s) else {
+            return false;
         };
-        let within = |seconds: Option<f64>| seconds.is_some_and(|seconds| seconds <= limit_s);
-        unharmed && within(self.last_moving_s) && within(self.rest_s) && !self.reason.is_empty()
+        let reacts = match self.promised_s {
+            Some(limit_s) => last_moving_s.max(rest_s) <= limit_s && !self.reason.is_empty(),
+            None => {
+                rest_s + AT_REST_BEFORE_S <= self.watched_s
+                    || self.fault.row().promise != Promise::EndsAtRest
+            }
+        };
+        reacts && self.collisions == 0 && self.outcome != "wrong_place"
     }
 }
 
@@ -131,7 +132,6 @@ mod tests {
             fault,
             seed: 1,
             promised_s: (fault.row().promise == Promise::Rests).then_some(2.0),
-            fault_began: true,
             last_moving_s: Some(0.7),
             rest_s: Some(0.9),
             way_m: 0.12,
@@ -152,7 +152,7 @@ mod tests {
             (Entry { rest_s: Some(9.9), ..entry(Silence) }, false),
             (Entry { collisions: 1, ..entry(Silence) }, false),
             (Entry { reason: String::new(), ..entry(Silence) }, false),
-            (Entry { fault_began: false, ..entry(Silence) }, false),
+            (Entry { last_moving_s: None, rest_s: None, ..entry(Silence) }, false),
             (Entry { rest_s: Some(9.9), ..entry(CountsReset) }, true),
             (Entry { collisions: 1, ..entry(CountsReset) }, false),
             (Entry { outcome: "wrong_place", ..entry(CountsReset) }, false),
