@@ -7,7 +7,7 @@ use std::{
 
 use console::robots::entries;
 use recording::{
-    End, Recording, RecordingError,
+    Recording, RecordingError,
     replay::{Options, replay},
 };
 use serde::Serialize;
@@ -17,15 +17,12 @@ use crate::chaos::consumers::Consumers;
 #[derive(Debug, Default, Serialize)]
 struct Counts {
     recordings: u64,
-    /// Generations with bit-equal outputs, and those that ended before their first step.
+    /// Generations with bit-equal outputs.
     equal: u64,
-    without_step: u64,
-    compared: u64,
-    cut: u64,
     /// Recordings without their run's name, because the recorder was killed before writing it.
     not_begun: u64,
     /// Partly recorded generations, whose state cannot be computed.
-    not_replayed: u64,
+    not_replayed: usize,
 }
 
 #[derive(Default, Serialize)]
@@ -52,19 +49,12 @@ impl Counts {
             }
             opened => opened?,
         };
-        self.cut += u64::from(recording.end != End::Complete);
         let report = replay(&recording, &Options::default())?;
-        for (stage, found) in &report.stages {
-            self.equal += found.equal;
-            self.without_step += found.without_step;
-            self.compared += found.compared;
-            self.not_replayed += found.not_replayed.len() as u64;
-            if !partial {
-                let not = found.not_replayed.iter();
-                wrong.extend(not.map(|(nth, why)| format!("{stage} generation {nth}: {why}")));
-            }
+        self.equal += report.equal();
+        self.not_replayed += report.not_replayed();
+        if report.difference.is_some() || !partial && report.not_replayed() > 0 {
+            wrong.push(report.to_string());
         }
-        wrong.extend(report.difference.map(|difference| difference.to_string()));
         Ok(())
     }
 }
