@@ -38,7 +38,10 @@ pub struct Report {
     kills: BTreeMap<String, BTreeMap<Kind, u32>>,
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     consumers: BTreeMap<String, ConsumerCounts>,
-    recovery_ms: BTreeMap<String, Recovery>,
+    /// By stage, delays of successors: until the first ready beat after kills, which are noticed at
+    /// once, and after freezes, which are noticed by missing beats; until the first sample of a
+    /// tick, which may come up to a tick later.
+    recovery_ms: BTreeMap<String, BTreeMap<&'static str, Delays>>,
     /// Maximum final pose error beyond the same seed's undisturbed run.
     pub worst_pose_excess_m: f64,
     pub leftovers: Vec<String>,
@@ -59,17 +62,7 @@ pub struct ConsumerCounts {
 }
 
 #[derive(Default, Serialize)]
-struct Recovery {
-    /// First ready beat after kills, which are noticed at once.
-    #[serde(serialize_with = "quantiles")]
-    ready: Histogram,
-    /// First ready beat after freezes, which are noticed by missing beats.
-    #[serde(rename = "ready_when_frozen", serialize_with = "quantiles")]
-    after_freeze: Histogram,
-    /// First sample of a tick, which may come up to a tick later.
-    #[serde(serialize_with = "quantiles")]
-    output: Histogram,
-}
+struct Delays(#[serde(serialize_with = "quantiles")] Histogram);
 
 pub struct Series {
     pub asked: Arguments,
@@ -127,22 +120,20 @@ impl Report {
             Some(counts) => &mut counts.killed,
             None => self.kills.entry(stage.clone()).or_default().entry(kind).or_default(),
         } += 1;
-        let Some(ready_ms) = ready_ms else { return };
-        let Recovery { ready, after_freeze, output } =
-            self.recovery_ms.entry(stage.clone()).or_default();
-        let record = |histogram: &mut Histogram, ms: f64| histogram.record((ms * 1e6) as u64);
-        if kind == Kind::Freeze {
-            record(after_freeze, ready_ms);
-        } else {
-            record(ready, ready_ms);
-            if let Some(ms) = first_output_ms {
-                record(output, ms);
+        let measured = match kind {
+            Kind::Freeze => [("ready_when_frozen", ready_ms), ("output", None)],
+            _ => [("ready", ready_ms), ("output", first_output_ms)],
+        };
+        for (name, ms) in measured {
+            if let Some(ms) = ms {
+                let delays = self.recovery_ms.entry(stage.clone()).or_default();
+                delays.entry(name).or_default().0.record((ms * 1e6) as u64);
             }
         }
     }
 }
 
-/// Serializes median, 99 % quantile and maximum in milliseconds; empty without measurements.
+/// Serializes median, 99 % quantile and maximum in milliseconds.
 fn quantiles<S: Serializer>(histogram: &Histogram, to: S) -> Result<S::Ok, S::Error> {
     let us = [0.5, 0.99, 1.0].into_iter().filter_map(|share| histogram.quantile_us(share));
     to.collect_seq(us.map(|us| rounded(us / 1e3)))
