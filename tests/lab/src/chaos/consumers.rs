@@ -11,7 +11,7 @@ use std::{
 };
 
 use clap::Args;
-use common::{domain::RobotName, file::append, start::become_child};
+use common::{file::append, start::become_child};
 use processes::{
     death::log_tail,
     executable,
@@ -20,10 +20,7 @@ use processes::{
 use rustix::process::{Pid, Signal, kill_process_group};
 
 use super::{options, report::Report, schedule::Kind};
-use crate::{
-    error::{OrCannot as _, Result},
-    robot,
-};
+use crate::error::{OrCannot as _, Result};
 
 /// A recorder writes its last chunk within milliseconds; user programs may take longer.
 const ENDS_WITHIN: Duration = Duration::from_secs(5);
@@ -52,7 +49,11 @@ impl Consumers {
         fs::create_dir(&directory).or_cannot("make a directory")?;
         let mut consumers = asked.consumer.clone();
         if asked.include_consumers {
-            consumers.extend(Consumer::own(&asked.robot)?);
+            for words in [RECORD, "topic hz", "logs -f"] {
+                let command = format!("firsthand {words} --robot {}", asked.robot);
+                let consumer: Consumer = command.parse()?;
+                consumers.push(Consumer { name: words.to_owned(), ..consumer });
+            }
         }
         let mut all = Vec::new();
         for (place, consumer) in consumers.into_iter().enumerate() {
@@ -193,18 +194,6 @@ impl FromStr for Consumer {
                  arguments; quote arguments with spaces (no shell reads them)"
             )
         })
-    }
-}
-
-impl Consumer {
-    fn own(robot: &RobotName) -> Result<[Self; 3]> {
-        let program = robot::path()?;
-        let own = |(name, words): (&str, &str)| Self {
-            name: name.to_owned(),
-            program: program.clone(),
-            arguments: format!("{words} --robot {robot}").split(' ').map(str::to_owned).collect(),
-        };
-        Ok([(RECORD, "record"), ("hz", "topic hz"), ("logs -f", "logs --follow")].map(own))
     }
 }
 

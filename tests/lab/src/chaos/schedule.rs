@@ -38,15 +38,12 @@ impl Kind {
 const MEAN_PAUSE: Duration = Duration::from_millis(500);
 /// Maximum time of a start-up hit after the start, in which the stage joins the bus.
 const STARTUP: Duration = Duration::from_millis(12);
-/// Share of signals followed by one to the starting successor. A fifth of all signals are such; the
+/// Share of kills followed by one of the starting successor. A fifth of all signals are such; the
 /// rest find no successor, or one that was ready too soon.
-const STARTUP_SHARE: f64 = 0.3;
-
+const STARTUP_SHARE: f64 = 3.0 / 7.0;
 const SUPERVISOR_SHARE: f64 = 0.05;
-
-const CONSUMER_SHARE: f64 = 0.5;
-
-const FREEZE_ALL_SHARE: f64 = 0.5;
+/// Share of signals to a consumer, and of freezes of everything.
+const OTHER_SHARE: f64 = 0.5;
 /// Range of freeze times of everything or a consumer: from below a stage's deadline to three times
 /// as long.
 const FREEZE_S: [f64; 2] = [0.3, 1.5];
@@ -74,7 +71,7 @@ impl Schedule {
     }
 
     pub fn freeze_all(&mut self) -> Option<Duration> {
-        self.0.chance(FREEZE_ALL_SHARE).then(|| self.freeze())
+        self.0.chance(OTHER_SHARE).then(|| self.freeze())
     }
 
     fn freeze(&mut self) -> Duration {
@@ -84,7 +81,7 @@ impl Schedule {
     /// Draws consumer, kind and freeze time, if a consumer is hit.
     pub fn consumer(&mut self, count: usize) -> Option<(usize, Kind, Duration)> {
         // Without consumers, this leaves the sequence of decisions unchanged.
-        (count > 0 && self.0.chance(CONSUMER_SHARE)).then(|| {
+        (count > 0 && self.0.chance(OTHER_SHARE)).then(|| {
             let index = self.0.below(count);
             let kind = if self.0.chance(0.7) { Kind::Kill } else { Kind::Freeze };
             (index, kind, self.freeze())
@@ -101,8 +98,6 @@ impl Schedule {
     }
 
     pub fn startup_hit(&mut self) -> Option<Duration> {
-        // Converts the share of all signals to a share of those that can be followed by one.
-        let share = STARTUP_SHARE / (1.0 - STARTUP_SHARE);
-        self.0.chance(share).then(|| STARTUP.mul_f64(self.0.share()))
+        self.0.chance(STARTUP_SHARE).then(|| STARTUP.mul_f64(self.0.share()))
     }
 }
