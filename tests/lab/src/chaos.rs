@@ -18,7 +18,7 @@ mod stop_time_table;
 
 pub use options::Arguments;
 
-use std::{fs, process::ExitCode, time::Instant};
+use std::{fs, process::ExitCode};
 
 use console::{
     missions,
@@ -48,20 +48,18 @@ fn judge(arguments: &Arguments) -> Result<bool> {
         print_rows(&[&table], arguments.json, table.text())?;
         return Ok(table.is_kept());
     }
-    let began = Instant::now();
     let mut series = Series::new(arguments)?;
     let ran = run(&mut series);
-    let Series { directory, mut report, .. } = series;
+    let Series { directory, report, .. } = series;
     let see = format!("see {}", directory.display());
     ran.map_err(|error| format!("{error}; {see}"))?;
-    report.took_s = began.elapsed().as_secs_f64();
     let is_clean = report.wrong.is_empty() && report.leftovers.is_empty();
     if is_clean {
         fs::remove_dir_all(&directory)?;
     } else {
         say(format_args!("missions failed; {see}"));
     }
-    print_rows(&[&report], arguments.json, crate::text(&report))?;
+    crate::print(&report, arguments.json)?;
     Ok(is_clean)
 }
 

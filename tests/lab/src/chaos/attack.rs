@@ -33,7 +33,7 @@ const MOST_HITS: usize = HOLD_AFTER - 4;
 pub struct Attack {
     seed: u64,
     time: Option<MissionTime>,
-    pub consumers: Consumers,
+    consumers: Consumers,
     entries: Vec<RosterEntry>,
     supervisor: u32,
     /// Whether later samples of the supervisor and its stages are no sign of its successor.
@@ -74,27 +74,23 @@ impl Attack {
         let mut joined = None;
         while child.try_reap().or_cannot("reap")?.is_none() && began.elapsed() < patience {
             self.consumers.maintain(&mut series.report)?;
-            let Some((subscriptions, next)) = &mut joined else {
-                match Subscriptions::join(&series.asked.robot, child.id()) {
-                    Ok(Some(found)) => {
-                        joined = Some((found, Instant::now() + series.schedule.pause()));
-                    }
-                    _ => std::thread::park_timeout(POLL),
+            let Some(subscriptions) = &mut joined else {
+                joined = Subscriptions::join(&series.asked.robot, child.id()).ok().flatten();
+                if joined.is_none() {
+                    std::thread::park_timeout(POLL);
                 }
                 continue;
             };
-            // An overdue hit waits until the robot drives.
-            let due = next.checked_duration_since(Instant::now()).unwrap_or(POLL);
+            let due = series.next_hit.checked_duration_since(Instant::now()).unwrap_or(POLL);
             subscriptions.roster.waiter.wait(due.min(POLL))?;
             if let Some(robot) = &mut robot {
                 robot.poll()?;
             }
             self.read(subscriptions)?;
             self.hit_starting(series);
-            if Instant::now() >= *next && self.driving && !series.is_over() {
-                let pause = series.schedule.pause();
+            if Instant::now() >= series.next_hit && self.driving && !series.is_over() {
                 self.hit(series)?;
-                *next = Instant::now() + pause;
+                series.next_hit = Instant::now() + series.schedule.pause();
             }
             self.keep_rows(series)?;
         }

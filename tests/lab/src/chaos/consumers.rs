@@ -26,10 +26,7 @@ use crate::error::{OrCannot as _, Result};
 const ENDS_WITHIN: Duration = Duration::from_secs(5);
 
 #[derive(Default)]
-pub struct Consumers {
-    all: Vec<Running>,
-    pub directory: PathBuf,
-}
+pub struct Consumers(Vec<Running>);
 
 struct Running {
     consumer: Consumer,
@@ -37,16 +34,17 @@ struct Running {
     process: Option<Process>,
     starts: u32,
     frozen_until: Option<Instant>,
+    /// File of its standard error, beside its recordings.
     said: PathBuf,
 }
 
 impl Consumers {
     pub fn start(
         asked: &options::Arguments,
-        directory: PathBuf,
+        directory: &Path,
         report: &mut Report,
     ) -> Result<Self> {
-        fs::create_dir(&directory).or_cannot("make a directory")?;
+        fs::create_dir(directory).or_cannot("make a directory")?;
         let mut consumers = asked.consumer.clone();
         if asked.include_consumers {
             for words in [RECORD, "topic hz", "logs -f"] {
@@ -60,18 +58,18 @@ impl Consumers {
             let said = directory.join(format!("stderr-{place}"));
             let mut running =
                 Running { consumer, process: None, starts: 0, frozen_until: None, said };
-            running.start(&directory, report)?;
+            running.start(report)?;
             all.push(running);
         }
-        Ok(Self { all, directory })
+        Ok(Self(all))
     }
 
     pub fn len(&self) -> usize {
-        self.all.len()
+        self.0.len()
     }
 
     pub fn maintain(&mut self, report: &mut Report) -> Result {
-        for running in &mut self.all {
+        for running in &mut self.0 {
             if running.frozen_until.is_some_and(|until| Instant::now() >= until) {
                 running.thaw();
             }
@@ -98,9 +96,9 @@ impl Consumers {
         report: &mut Report,
     ) -> Result<Option<(String, u32)>> {
         let freezes = kind == Kind::Freeze;
-        let running = &mut self.all[index];
+        let running = &mut self.0[index];
         if running.process.is_none() {
-            running.start(&self.directory, report)?;
+            running.start(report)?;
             return Ok(None);
         }
         if freezes && running.frozen_until.is_some() {
@@ -112,25 +110,25 @@ impl Consumers {
             running.frozen_until = Some(Instant::now() + pause);
         } else {
             running.process = None;
-            running.start(&self.directory, report)?;
+            running.start(report)?;
         }
         Ok(Some(hit))
     }
 
     /// Ends all consumers after they write their files.
     pub fn end(&mut self) {
-        for running in &mut self.all {
+        for running in &mut self.0 {
             running.thaw();
             running.signal(Signal::TERM);
         }
-        for mut process in self.all.drain(..).filter_map(|running| running.process) {
+        for mut process in self.0.drain(..).filter_map(|running| running.process) {
             process.end(ENDS_WITHIN);
         }
     }
 }
 
 impl Running {
-    fn start(&mut self, directory: &Path, report: &mut Report) -> Result {
+    fn start(&mut self, report: &mut Report) -> Result {
         let Consumer { name, program, arguments } = &self.consumer;
         let own = std::process::id().to_string();
         let mut command = process::firsthand(&["bench", "consumer", &own]);
@@ -138,7 +136,8 @@ impl Running {
         self.frozen_until = None;
         self.starts += 1;
         if name == RECORD {
-            command.arg("--out").arg(directory.join(format!("record-{}.mcap", self.starts)));
+            let file = format!("record-{}.mcap", self.starts);
+            command.arg("--out").arg(self.said.with_file_name(file));
         }
         command.stderr(append(&self.said).or_cannot("write what a consumer says")?);
         self.process = Some(Process::spawn(command).or_cannot("start a consumer")?);

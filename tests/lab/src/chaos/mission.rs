@@ -51,8 +51,8 @@ pub fn attack(series: &mut Series) -> Result {
         let address = robot.address();
         start.args(["--set", &format!("robot.address='udp://{address}'")]);
     }
-    let consumers = files.join("consumers");
-    let consumers = Consumers::start(&series.asked, consumers, &mut series.report)?;
+    let others = files.join("consumers");
+    let consumers = Consumers::start(&series.asked, &others, &mut series.report)?;
     let mut attack = Attack::new(seed, consumers);
     let began = Instant::now();
     let summary = loop {
@@ -107,7 +107,7 @@ pub fn attack(series: &mut Series) -> Result {
     }
     if replays {
         let replays = report.replays.get_or_insert_default();
-        replays.add(&directory, hits_recorders, &attack.consumers, &mut wrong);
+        replays.add(&directory, hits_recorders, &others, &mut wrong);
     }
     if wrong.is_empty() {
         fs::remove_dir_all(&files).or_cannot("remove its directory")?;

@@ -12,8 +12,6 @@ use recording::{
 };
 use serde::Serialize;
 
-use crate::chaos::consumers::Consumers;
-
 #[derive(Debug, Default, Serialize)]
 struct Counts {
     recordings: u64,
@@ -60,12 +58,13 @@ impl Counts {
 }
 
 impl Replays {
-    /// Adds different, failed and unreadable recordings to `wrong`.
+    /// Replays recordings of the run in `directory`, and of `others`. Adds different, failed and
+    /// unreadable ones to `wrong`.
     pub fn add(
         &mut self,
         directory: &Path,
         hits_recorders: bool,
-        consumers: &Consumers,
+        others: &Path,
         wrong: &mut Vec<String>,
     ) {
         let partial = hits_recorders || began_late(directory);
@@ -73,7 +72,7 @@ impl Replays {
         if own.is_empty() {
             wrong.push("the mission has no recording".to_owned());
         }
-        let others = recordings(&consumers.directory).map(|file| (true, file));
+        let others = recordings(others).map(|file| (true, file));
         for (partial, file) in own.into_iter().chain(others) {
             let counts = if partial { &mut self.partial } else { &mut self.whole };
             if let Err(error) = counts.add(&file, partial, wrong) {

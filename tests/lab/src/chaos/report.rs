@@ -47,7 +47,6 @@ pub struct Report {
     pub leftovers: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub replays: Option<Replays>,
-    pub took_s: f64,
 }
 
 #[derive(Default, Serialize)]
@@ -70,6 +69,8 @@ pub struct Series {
     /// Parent of the run directories, emptied after each mission.
     pub directory: PathBuf,
     pub schedule: Schedule,
+    /// Time of the next signal; an overdue one waits until the robot drives.
+    pub next_hit: Instant,
     pub report: Report,
     signals: Table<Row>,
 }
@@ -90,8 +91,15 @@ impl Series {
         let directory = env::temp_dir().join(name);
         let signals = create(asked.out.as_ref().unwrap_or(&directory))?;
         fs::create_dir_all(&directory).or_cannot_file("make", &directory)?;
-        let schedule = Schedule::new(asked.seed);
-        Ok(Self { asked, loaded, directory, schedule, report: Report::default(), signals })
+        Ok(Self {
+            schedule: Schedule::new(asked.seed),
+            next_hit: Instant::now(),
+            report: Report::default(),
+            asked,
+            loaded,
+            directory,
+            signals,
+        })
     }
 
     pub fn keep(&mut self, row: Row) -> Result {
