@@ -36,8 +36,8 @@ pub struct Attack {
     consumers: Consumers,
     entries: Vec<RosterEntry>,
     supervisor: u32,
-    /// Whether later samples of the supervisor and its stages are no sign of its successor.
-    supervisor_hit: bool,
+    /// Number of supervisors until now; each has its own bus.
+    supervisors: u32,
     driving: bool,
     sent: Vec<Sent>,
     kept: usize,
@@ -65,7 +65,8 @@ impl Attack {
         patience: Duration,
     ) -> Result {
         let began = Instant::now();
-        (self.supervisor_hit, self.driving) = (false, false);
+        self.supervisors += 1;
+        self.driving = false;
         self.entries.clear();
         // A hit supervisor's stages end with it.
         for sent in &mut self.sent {
@@ -160,7 +161,7 @@ impl Attack {
             self.supervisor = entries.header().supervisor_pid;
             self.entries = entries.to_vec();
             if self.driving {
-                self.on_sign(SUPERVISOR, 0, true);
+                self.on_sign(SUPERVISOR, self.supervisors, true);
             }
         }
         while let Some(health) = subscriptions.health.next_sample()? {
@@ -173,7 +174,7 @@ impl Attack {
                 self.time = self.time.max(Some(stamp.time()));
                 self.on_sign(writer, stamp.generation, false);
                 if *writer == topics::COMMAND.spec().writer {
-                    self.on_sign(SUPERVISOR, 0, false);
+                    self.on_sign(SUPERVISOR, self.supervisors, false);
                 }
             }
         }
@@ -181,10 +182,7 @@ impl Attack {
     }
 
     fn on_sign(&mut self, stage: &str, generation: u32, beat: bool) {
-        // The successor of a hit supervisor has its own bus.
-        let is_of_former = stage == SUPERVISOR && self.supervisor_hit;
-        if !is_of_former
-            && let Some(Sent { row, at, pending, .. }) = self.pending(stage)
+        if let Some(Sent { row, at, pending, .. }) = self.pending(stage)
             && Some(generation) > row.generation
         {
             row.ready_ms.get_or_insert_with(|| ms_since(*at));
@@ -222,8 +220,8 @@ impl Attack {
             && let Some(kind) = schedule.supervisor()
         {
             if !self.supervisor_is_down() && send(self.supervisor, kind.signal()) {
-                self.note(series, (SUPERVISOR, None), kind, true);
-                (self.supervisor_hit, self.driving) = (true, false);
+                self.note(series, (SUPERVISOR, Some(self.supervisors)), kind, true);
+                self.driving = false;
             }
         } else if asked.freeze_all
             && let Some(pause) = schedule.freeze_all()

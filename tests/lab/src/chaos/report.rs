@@ -155,8 +155,8 @@ pub struct Row {
     pub time_s: Option<f64>,
     pub stage: String,
     pub kind: Kind,
-    /// Generation; for a consumer, its number of starts in that mission. None for the supervisor,
-    /// everything, and the run's own recorder.
+    /// Generation; for the supervisor and a consumer, its number of starts in that mission. None for
+    /// everything.
     pub generation: Option<u32>,
     /// Whether the hit was due in the process's first milliseconds.
     pub start_up: bool,
