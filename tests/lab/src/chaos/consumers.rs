@@ -78,9 +78,10 @@ impl Consumers {
             {
                 running.process = None;
                 let said = log_tail(&running.said, 0);
-                let counts = report.consumer(&running.consumer.name);
-                counts.ended_by_itself += 1;
-                counts.last_end = Some(format!("{cause}: {}", said.lines().last().unwrap_or("-")));
+                let end = format!("{cause}: {}", said.lines().last().unwrap_or("-"));
+                let name = &running.consumer.name;
+                report.count(name, "ended_by_itself");
+                report.last_ends.insert(name.clone(), end);
             }
         }
         Ok(())
@@ -141,7 +142,7 @@ impl Running {
         }
         command.stderr(append(&self.said).or_cannot("write what a consumer says")?);
         self.process = Some(Process::spawn(command).or_cannot("start a consumer")?);
-        report.consumer(name).started += 1;
+        report.count(name, "started");
         Ok(())
     }
 

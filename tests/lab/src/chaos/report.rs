@@ -36,8 +36,12 @@ pub struct Report {
     #[serde(skip)]
     pub signals: u32,
     kills: BTreeMap<String, BTreeMap<Kind, u32>>,
+    /// By consumer: how often it was killed, frozen and started, and ended by itself.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    consumers: BTreeMap<String, ConsumerCounts>,
+    consumers: BTreeMap<String, BTreeMap<&'static str, u32>>,
+    /// Last end by itself of each consumer, and the last line of its standard error.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub last_ends: BTreeMap<String, String>,
     /// By stage, delays of successors: until the first ready beat after kills, which are noticed at
     /// once, and after freezes, which are noticed by missing beats; until the first sample of a
     /// tick, which may come up to a tick later.
@@ -47,17 +51,6 @@ pub struct Report {
     pub leftovers: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub replays: Option<Replays>,
-}
-
-#[derive(Default, Serialize)]
-pub struct ConsumerCounts {
-    killed: u32,
-    frozen: u32,
-    pub started: u32,
-    pub ended_by_itself: u32,
-    /// Last such end, and the last line of its standard error.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub last_end: Option<String>,
 }
 
 #[derive(Default, Serialize)]
@@ -113,8 +106,8 @@ impl Series {
 }
 
 impl Report {
-    pub fn consumer(&mut self, name: &str) -> &mut ConsumerCounts {
-        self.consumers.entry(name.to_owned()).or_default()
+    pub fn count(&mut self, consumer: &str, what: &'static str) {
+        *self.consumers.entry(consumer.to_owned()).or_default().entry(what).or_default() += 1;
     }
 
     pub fn kills(&self) -> u32 {
@@ -123,11 +116,11 @@ impl Report {
 
     fn add(&mut self, row: &Row) {
         let Row { ref stage, kind, ready_ms, first_output_ms, .. } = *row;
-        *match self.consumers.get_mut(stage) {
-            Some(counts) if kind == Kind::Freeze => &mut counts.frozen,
-            Some(counts) => &mut counts.killed,
-            None => self.kills.entry(stage.clone()).or_default().entry(kind).or_default(),
-        } += 1;
+        if self.consumers.contains_key(stage) {
+            self.count(stage, if kind == Kind::Freeze { "frozen" } else { "killed" });
+        } else {
+            *self.kills.entry(stage.clone()).or_default().entry(kind).or_default() += 1;
+        }
         let measured = match kind {
             Kind::Freeze => [("ready_when_frozen", ready_ms), ("output", None)],
             _ => [("ready", ready_ms), ("output", first_output_ms)],
