@@ -130,10 +130,10 @@ impl Consumers {
 
 impl Running {
     fn start(&mut self, report: &mut Report) -> Result {
-        let Consumer { name, program, arguments } = &self.consumer;
+        let Consumer { name, words } = &self.consumer;
         let own = std::process::id().to_string();
         let mut command = process::firsthand(&["bench", "consumer", &own]);
-        command.arg(program).args(arguments).stdout(Stdio::null());
+        command.args(words).stdout(Stdio::null());
         self.frozen_until = None;
         self.starts += 1;
         if name == RECORD {
@@ -168,8 +168,8 @@ const RECORD: &str = "record";
 #[derive(Clone, Debug)]
 pub struct Consumer {
     name: String,
-    program: PathBuf,
-    arguments: Vec<String>,
+    /// Path of the program, and its arguments.
+    words: Vec<String>,
 }
 
 impl FromStr for Consumer {
@@ -180,13 +180,13 @@ impl FromStr for Consumer {
             if command.contains('\0') {
                 return Err("it contains a zero byte".to_owned());
             }
-            let words =
+            let mut words =
                 shlex::split(command).ok_or("it ends within quotes or after a backslash")?;
-            let mut words = words.into_iter();
-            let program = words.next().ok_or("it is empty")?;
-            let found = executable::find(Path::new(&program));
-            let program = found.map_err(|problem| format!("{program}: {problem}"))?;
-            Ok(Self { name: command.to_owned(), program, arguments: words.collect() })
+            let program = words.first_mut().ok_or("it is empty")?;
+            let found = executable::find(Path::new(&*program));
+            *program =
+                found.map_err(|problem| format!("{program}: {problem}"))?.display().to_string();
+            Ok(Self { name: command.to_owned(), words })
         };
         parsed().map_err(|problem: String| {
             format!(
@@ -238,9 +238,10 @@ mod tests {
     fn a_command_is_its_program_and_its_words_and_nothing_is_expanded() {
         let command = "sh -c 'exit  1' \"d 'e\" f\\ g '' $HOME *.rs | `id`";
         let given: Consumer = command.parse().unwrap();
-        assert!(given.program.is_absolute() && given.program.ends_with("sh"));
+        let program = Path::new(&given.words[0]);
+        assert!(program.is_absolute() && program.ends_with("sh"));
         let words = ["-c", "exit  1", "d 'e", "f g", "", "$HOME", "*.rs", "|", "`id`"];
-        assert_eq!(given.arguments, words);
+        assert_eq!(given.words[1..], words);
         assert_eq!(given.name, command);
     }
 }
