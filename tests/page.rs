@@ -100,12 +100,10 @@ fn a_robot_is_watched_stopped_and_resumed_on_a_phone_that_loses_and_regains_its_
     browser.tap("stop", 0, 0);
     browser.wait_for("answer", "stop: the robot rests");
     browser.wait_until(RESTS);
-    browser.tap("resume", 0, 0);
-    browser.wait_until(GOES);
+    browser.tap_until("resume", GOES);
     browser.press(" ");
     browser.wait_until(RESTS);
-    browser.tap("resume", 0, 0);
-    browser.wait_until(GOES);
+    browser.tap_until("resume", GOES);
 
     // The browser scrubs back, while the header stays live.
     browser.run("const time = document.getElementById('time'); time.value = time.min; time.dispatchEvent(new Event('input'))");
@@ -189,8 +187,7 @@ fn actions_and_answers_are_in_view_at_every_size_without_scrolling() {
         seen(&["stop", "answer", "status", "go"], "0", "after a stop");
         seen(&["stop", "answer", "status"], "document.body.scrollHeight", "scrolled down");
         browser.assert_legible();
-        browser.tap("resume", 0, 0);
-        browser.wait_until(GOES);
+        browser.tap_until("resume", GOES);
         browser.tap("clear", 0, 0);
     }
     run.stop();

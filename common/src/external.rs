@@ -71,7 +71,7 @@ pub(crate) fn join(stage: &'static str, robot: &RobotName) -> Result<Joined> {
 
 /// Returns the stage's first tick and a descriptor of its supervisor, as [`watch`] does.
 fn wait_for_place(bus: &Bus, stage: &str) -> Result<(u64, OwnedFd)> {
-    let mut first = None;
+    let mut taken: Option<(Instant, u32)> = None;
     let place = Roster::open(bus)?.find(PATIENCE, |header, entries| {
         if header.order() == Order::Stop {
             let error = StageError::Other("the robot is being stopped".to_owned());
@@ -82,17 +82,22 @@ fn wait_for_place(bus: &Bus, stage: &str) -> Result<(u64, OwnedFd)> {
             let first_tick = header.stamp.tick + 1;
             return Some(watch(header.supervisor_pid).map(|supervisor| (first_tick, supervisor)));
         }
-        let is_taken = first.get_or_insert_with(Instant::now).elapsed() >= FREED_WITHIN;
-        is_taken.then(|| {
-            let pid = entry.pid;
-            let taken = format!("{stage} already runs as process {pid}; end that process first");
-            Err(StageError::Other(taken))
-        })
+        let since = taken.map_or_else(Instant::now, |(since, _)| since);
+        taken = Some((since, entry.pid));
+        (since.elapsed() >= FREED_WITHIN).then(|| Err(is_taken(stage, entry.pid)))
     })?;
-    place.unwrap_or_else(|| {
-        let silent = "no supervisor publishes on the robot's bus; check whether it is frozen";
-        Err(StageError::Other(silent.to_owned()))
-    })
+    // On a busy machine the supervisor may be heard too late to wait.
+    place.unwrap_or_else(|| Err(taken.map_or_else(is_silent, |(_, pid)| is_taken(stage, pid))))
+}
+
+fn is_taken(stage: &str, pid: u32) -> StageError {
+    let taken = format!("{stage} already runs as process {pid}; end that process first");
+    StageError::Other(taken)
+}
+
+fn is_silent() -> StageError {
+    let silent = "no supervisor publishes on the robot's bus; check whether it is frozen";
+    StageError::Other(silent.to_owned())
 }
 
 fn gone() -> StageError {

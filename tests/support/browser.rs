@@ -147,6 +147,21 @@ impl Browser {
         self.post("/actions", &json!({"actions": [finger]}));
     }
 
+    /// Taps until `script` is true: a starved page says that it has no connection, and whoever uses
+    /// it taps again.
+    pub fn tap_until(&self, id: &str, script: &str) {
+        let began = Instant::now();
+        let is_lost = "document.getElementById('answer').textContent.includes('no connection')";
+        while began.elapsed() < PATIENCE {
+            self.tap(id, 0, 0);
+            self.wait_until(&format!("{script} || {is_lost}"));
+            if self.run(&format!("return Boolean({script})")) == true {
+                return;
+            }
+        }
+        panic!("timeout: {script}");
+    }
+
     pub fn press(&self, key: &str) {
         let strokes = ["keyDown", "keyUp"].map(|stroke| json!({"type": stroke, "value": key}));
         let keys = json!({"type": "key", "id": "keys", "actions": strokes});
