@@ -74,6 +74,16 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_run_directory_is_where_the_supervisor_has_its_log_open() {
+        let directory = tempfile::tempdir().unwrap();
+        let directory = fs::canonicalize(directory.path()).unwrap();
+        let own = std::process::id();
+        assert_eq!(run_directory(own), None);
+        let _log = fs::File::create(directory.join(SUPERVISOR_LOG)).unwrap();
+        assert_eq!(run_directory(own), Some(directory));
+    }
+
+    #[test]
     fn another_users_directory_is_one_that_the_user_owns() {
         let directory = tempfile::tempdir().unwrap();
         let own = rustix::process::geteuid().as_raw();

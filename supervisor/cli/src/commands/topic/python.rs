@@ -128,6 +128,41 @@ fn python(kind: &Kind) -> String {
 mod tests {
     use super::*;
 
+    /// Returns size and alignment in C.
+    fn in_c(kind: &Kind) -> (usize, usize) {
+        match kind {
+            Kind::Number(number) => {
+                let bits: usize = number[1..].parse().unwrap();
+                (bits / 8, bits / 8)
+            }
+            Kind::Array(element, length) => {
+                let (size, align) = in_c(element);
+                (size * length, align)
+            }
+            Kind::Struct(structure) => {
+                let (mut end, mut most) = (0_usize, 1);
+                for field in &structure.fields {
+                    let (size, align) = in_c(&field.kind);
+                    let offset = end.next_multiple_of(align);
+                    assert_eq!(field.offset, offset, "{}.{}", structure.name, field.name);
+                    (end, most) = (offset + size, most.max(align));
+                }
+                let size = end.next_multiple_of(most);
+                assert_eq!(structure.size, size, "{}", structure.name);
+                (size, most)
+            }
+        }
+    }
+
+    #[test]
+    fn every_payload_has_the_size_and_the_offsets_that_its_declared_fields_have_in_c() {
+        for topic in topics::TABLE {
+            let (payload, element) = topic.layout();
+            in_c(&payload);
+            element.as_ref().map(in_c);
+        }
+    }
+
     #[test]
     fn python_takes_the_layouts_of_the_module_for_the_same_prints_fields_and_joins_a_series() {
         let module = module();
