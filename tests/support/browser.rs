@@ -119,11 +119,15 @@ impl Browser {
         self.wait_until(&format!("document.getElementById('{id}').textContent.includes('{text}')"));
     }
 
+    fn is_so(&self, script: &str) -> bool {
+        self.run(&format!("return Boolean({script})")) == true
+    }
+
     /// Waits until a script returns true.
     #[track_caller]
     pub fn wait_until(&self, script: &str) {
         let began = Instant::now();
-        while self.run(&format!("return Boolean({script})")) != true {
+        while !self.is_so(script) {
             let texts = ["status", "answer", "notice"].map(|id| self.text(id));
             assert!(began.elapsed() < PATIENCE, "timeout: {script}: {texts:?}");
         }
@@ -155,7 +159,7 @@ impl Browser {
         while began.elapsed() < PATIENCE {
             self.tap(id, 0, 0);
             self.wait_until(&format!("{script} || {is_lost}"));
-            if self.run(&format!("return Boolean({script})")) == true {
+            if self.is_so(script) {
                 return;
             }
         }

@@ -127,6 +127,7 @@ impl Invariants {
 
     pub(crate) fn on_disturbance(&mut self, what: &What, now: Duration) {
         use What::*;
+        self.was_faulty |= matches!(what, Wire(..) | Fault(Some(_)));
         match what {
             Kill(stage)
             | KillAfter(stage, _)
@@ -135,11 +136,7 @@ impl Invariants {
             | Hang(stage)
             | Break(stage, _)
             | Ask(Request::Restart(stage)) => self.disturbed.push((stage, now)),
-            Wire(way, quality) => {
-                self.was_faulty = true;
-                if *way == Way::ToHost {
-                    return;
-                }
+            Wire(Way::ToRobot, quality) => {
                 self.wire_is_calm = *quality == Quality::default();
                 self.obedience_changed = now;
             }
@@ -147,9 +144,8 @@ impl Invariants {
                 self.obeys = !fault.is_some_and(RobotFault::keeps_speed);
                 self.obedience_changed = now;
                 self.has_lied |= fault.is_some_and(RobotFault::lies);
-                self.was_faulty |= fault.is_some();
             }
-            KillSupervisor(_) | Ask(_) | Beacon(_) | End => {}
+            KillSupervisor(_) | Wire(..) | Ask(_) | Beacon(_) | End => {}
         }
     }
 
