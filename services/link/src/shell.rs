@@ -257,7 +257,7 @@ impl Process for Shell {
         let link = &self.runner.stage.link;
         let at = |machine_ns| {
             let time = self.clock.at(link.state.next_tick, machine_ns);
-            Moment { time, machine_ns }
+            Moment { time, machine_ns, ..Moment::default() }
         };
         let now = at(monotonic_ns());
         let until_due = match self.clock {

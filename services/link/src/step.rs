@@ -53,6 +53,8 @@ const REPEAT_AFTER: Duration = Duration::from_millis(100);
 pub const LIMIT_WAITED: Duration = Duration::from_secs(5);
 /// Least time limit of a command: the wire carries milliseconds, and 0 mostly means none.
 const LEAST_LEFT: Duration = Duration::from_millis(1);
+/// Longest interval of events without a pause of the link: some of its turns without input.
+const PAUSED_AFTER: Duration = Duration::from_millis(100);
 /// Copies of a new stop, because datagrams may be lost.
 pub const STOPS: u32 = 3;
 /// Stop interval: a fading radio may lose all copies, and the robot may ignore its last command's
@@ -85,6 +87,8 @@ pub struct Link {
     pub state: State,
     now: MissionTime,
     now_ns: u64,
+    /// Whether this is the first turn after a pause of the link.
+    is_after_pause: bool,
     /// Effects of the present step.
     effects: Vec<Effect>,
     base: Box<dyn Base>,
@@ -132,6 +136,7 @@ impl Link {
             state: State::default(),
             now: MissionTime::default(),
             now_ns: 0,
+            is_after_pause: false,
             effects: Vec::new(),
             base: drivers::base(mission).0,
             drivers: drivers::sensors(mission).into_iter().map(|sensor| sensor.driver).collect(),
@@ -178,6 +183,7 @@ impl Link {
 
     pub fn step(&mut self, entry: Entry<'_>) -> Vec<Effect> {
         let Entry { event, machine_ns, now } = entry;
+        self.is_after_pause |= has_passed(self.now_ns, machine_ns, PAUSED_AFTER);
         (self.now, self.now_ns) = (now, machine_ns);
         if !self.in_ticks() {
             self.stood.get_or_insert(now);
@@ -200,7 +206,8 @@ impl Link {
             Event::TickLimit { last_tick, target_number } => {
                 (self.last_tick, self.target_number) = (Some(last_tick), target_number);
             }
-            Event::Quiet | Event::Operator(Request::SignOff | Request::Look) => {}
+            Event::Quiet => self.is_after_pause = false,
+            Event::Operator(Request::SignOff | Request::Look) => {}
             Event::Remember(memory) => {
                 if let Some(odometry) = self.base.odometry() {
                     odometry.remember(memory);
@@ -258,7 +265,7 @@ impl Link {
     }
 
     pub fn explain(&self, cause: Cause, machine_ns: u64) -> Option<String> {
-        self.failsafe.explain(cause, Moment { time: self.now, machine_ns })
+        self.failsafe.explain(cause, Moment { machine_ns, ..self.moment() })
     }
 
     pub fn absence(&self, now_ns: u64) -> Absence {
@@ -288,7 +295,8 @@ impl Link {
     }
 
     const fn moment(&self) -> Moment {
-        Moment { time: self.now, machine_ns: self.now_ns }
+        let Self { now, now_ns, is_after_pause, .. } = *self;
+        Moment { time: now, machine_ns: now_ns, is_after_pause }
     }
 
     fn observe(&mut self, what: Observation<'_>) {

@@ -13,6 +13,8 @@ use common::{
 pub struct Moment {
     pub time: MissionTime,
     pub machine_ns: u64,
+    /// Whether the link paused before: what it reads now came at an unknown time of the pause.
+    pub is_after_pause: bool,
 }
 
 #[derive(Clone, Copy, Debug)]

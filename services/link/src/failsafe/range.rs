@@ -303,10 +303,12 @@ impl Monitor for Range {
                     }
                 }
                 self.hearing.take(readings, self.pose, now.time.seconds());
-                self.motion.take(readings, &self.poses, now.time.seconds());
-                self.tell();
+                if !now.is_after_pause {
+                    self.motion.take(readings, &self.poses, now.time.seconds());
+                    self.tell();
+                }
             }
-            Observation::Scan(scan, at_s) => {
+            Observation::Scan(scan, at_s) if !now.is_after_pause => {
                 if let Some(scans) = self.scans.iter_mut().find(|scans| scans.row == scan.row) {
                     scans.take(scan, &self.poses, at_s);
                 }

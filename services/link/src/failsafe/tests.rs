@@ -26,7 +26,7 @@ fn front_only() -> Mission {
 
 const fn ago(ns: u64) -> Moment {
     let machine_ns = 100_000 * MS - ns;
-    Moment { time: MissionTime(machine_ns), machine_ns }
+    Moment { time: MissionTime(machine_ns), machine_ns, is_after_pause: false }
 }
 
 const fn now() -> Moment {

@@ -193,6 +193,22 @@ fn ticks(effects: &[Effect]) -> Vec<(u64, Vec<RangeReading>, WheelSample)> {
 }
 
 #[test]
+fn what_came_during_a_pause_of_the_link_is_known_to_have_waited_until_its_turn_ends() {
+    let mut link = on_the_wall();
+    for (event, ms, waited) in [
+        (Event::Quiet, 0, false),
+        (Event::Datagram(b"{}"), 90, false),
+        (Event::Datagram(b"{}"), 300, true),
+        (Event::Datagram(b"{}"), 300, true),
+        (Event::Quiet, 300, false),
+        (Event::Datagram(b"{}"), 320, false),
+    ] {
+        link.at(event, ms);
+        assert_eq!(link.moment().is_after_pause, waited, "{event:?} at {ms} ms");
+    }
+}
+
+#[test]
 fn a_link_pings_until_the_robot_answers_sets_it_up_and_tells_it_to_stand_until_a_command_comes() {
     let mut link = on_the_wall();
     // A silent robot may still receive.

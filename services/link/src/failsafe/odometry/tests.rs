@@ -247,7 +247,7 @@ fn held(
         if let Some(suspicion) = suspicion(&odometry) {
             return (contacts, Some((time, suspicion)));
         }
-        let moment = Moment { time: at(time), machine_ns: 0 };
+        let moment = Moment { time: at(time), ..Moment::default() };
         let stands = odometry.condition(Cause::WheelsHeld, moment) == Condition::Holds;
         stood = if stands { stood + 1 } else { 0 };
         let told = if stands { [0, 0] } else { tells };

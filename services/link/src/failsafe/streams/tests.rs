@@ -8,7 +8,7 @@ fn streams(text: &str) -> Streams {
 }
 
 const fn moment(ms: u64) -> Moment {
-    Moment { time: MissionTime(ms * MS), machine_ns: ms * MS }
+    Moment { time: MissionTime(ms * MS), machine_ns: ms * MS, is_after_pause: false }
 }
 
 impl Streams {

@@ -322,7 +322,8 @@ impl World {
     }
 
     fn key(&self) -> String {
-        let moment = Moment { time: MissionTime(self.now_ns), machine_ns: self.now_ns };
+        let machine_ns = self.now_ns;
+        let moment = Moment { time: MissionTime(machine_ns), machine_ns, ..Moment::default() };
         let (link, supervisor) = (&self.link, &self.supervisor);
         let all = &link.failsafe.monitors;
         let applied = Vec::from_iter(TABLE.iter().map(|row| link.failsafe.applied(row.cause)));
