@@ -29,6 +29,7 @@ mod status;
 mod stop;
 mod table;
 mod topic;
+mod try_log;
 mod zone;
 
 use std::{
@@ -95,6 +96,7 @@ commands! {
     }
     "Judge it" {
         Check check,
+        Try try_log,
         @"evaluate" @"experiments" @"field"
     }
     "Break it" {

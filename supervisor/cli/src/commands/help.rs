@@ -46,6 +46,7 @@ static GUIDE: &[Part] = guide! {
     "Tutorial":
     "tutorial";
     "How-to":
+    "try-a-log",
     "operate",
     "json-robot",
     "ros2-robot",

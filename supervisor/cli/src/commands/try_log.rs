@@ -1,0 +1,127 @@
+use std::{fs, path::PathBuf};
+
+use clap::Args;
+use common::{kinematics::Pose2, samples::PoseSample};
+use picture::{Facts, Scene};
+use serde::Serialize;
+use trial::{Drive, Judged, Log};
+
+use console::{
+    failure::{Refused, Result},
+    output::{json_lines, print_text},
+};
+
+/// Try a robot's log: track it as a robot that somebody else drives, and judge the result.
+///
+/// Reads logs in CARMEN's format with a laser of 180 degrees. A log with corrected poses, such as
+/// GMapping writes, judges them too.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Log with odometry and laser scans.
+    #[arg(value_name = "LOG")]
+    log: PathBuf,
+    /// Tables `[robot]` and `[[robot.sensor]]` of its robot; by default of a robot with this laser.
+    #[arg(long, value_name = "FILE.toml")]
+    robot: Option<PathBuf>,
+    /// Directory for poses, picture and map.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print one line of JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Row {
+    time_s: f64,
+    x_m: f64,
+    y_m: f64,
+    heading_rad: f64,
+    /// Standard deviations.
+    x_sd_m: f64,
+    y_sd_m: f64,
+    heading_sd_rad: f64,
+}
+
+pub fn main(arguments: &Arguments) -> Result {
+    let log = Log::read(&arguments.log)?;
+    let robot = arguments.robot.as_ref().map(fs::read_to_string).transpose()?;
+    let mission = trial::mission(&log, robot.as_deref())?;
+    let drive = trial::drive(&log, &mission).ok_or_else(|| {
+        Refused::new(
+            "no-laser",
+            "the robot has no laser; give --robot with a [[robot.sensor]] of kind \"scan\"",
+        )
+    })?;
+    let judged = trial::judge(&log, &drive);
+    if let Some(out) = &arguments.out {
+        fs::create_dir_all(out)?;
+        let mut rows = csv::Writer::from_path(out.join("poses.csv"))?;
+        for pose in &drive.poses {
+            rows.serialize(row(pose))?;
+        }
+        rows.flush()?;
+        maps::save_believed(&out.join("map.yaml"), &mission, &drive.frame, &drive.cells)?;
+        let believed: Vec<Pose2> = drive.poses.iter().map(PoseSample::pose).collect();
+        let svg = picture::svg(&Scene {
+            mission: &mission,
+            grid: Some((drive.frame, &drive.cells)),
+            field: None,
+            believed: &believed,
+            covariance: None,
+            truth: drive.references.as_deref().unwrap_or_default(),
+            targets: &[],
+            trails: &[],
+            facts: Facts {
+                outcome: "tried",
+                reached: true,
+                mission_time_s: log.instants.last().map_or(0.0, |it| it.time_s),
+                path_length_m: drive.poses.last().map_or(0.0, |it| it.travelled_m),
+                straight_m: believed.last().map_or(0.0, |it| it.position.length()),
+                safety_events: 0,
+                seed: None,
+            },
+            captions: &[],
+        });
+        fs::write(out.join("picture.svg"), svg)?;
+    }
+    print_text(if arguments.json { json_lines(&[&judged])? } else { text(&judged, &drive) })
+}
+
+fn row(pose: &PoseSample) -> Row {
+    let [xx, _, _, yy, _, heading] = pose.covariance.map(f64::sqrt);
+    Row {
+        time_s: pose.stamp.time().seconds(),
+        x_m: pose.x_m,
+        y_m: pose.y_m,
+        heading_rad: pose.heading_rad,
+        x_sd_m: xx,
+        y_sd_m: yy,
+        heading_sd_rad: heading,
+    }
+}
+
+fn text(judged: &Judged, drive: &Drive) -> String {
+    let metres = |it: Option<f64>| it.map_or("-".to_owned(), |it| format!("{it:.3} m"));
+    let mut text = format!(
+        "{} scans, {:.0} % matched\n\
+        error over 5 m: {} (odometry alone: {})\n\
+        error over 20 m: {} (odometry alone: {})\n\
+        poses beyond two standard deviations: {}\n\
+        cells that the map's points touch, over those by odometry alone: {:.2}\n\
+        stands of the failsafe: {}\n",
+        judged.scans,
+        100.0 * judged.fixes,
+        metres(judged.error_5_m),
+        metres(judged.odometry_error_5_m),
+        metres(judged.error_20_m),
+        metres(judged.odometry_error_20_m),
+        judged.beyond_2_sigma.map_or("-".to_owned(), |it| format!("{:.1} %", 100.0 * it)),
+        judged.blur_ratio,
+        judged.false_stands,
+    );
+    for stand in &drive.stands {
+        text += &format!("  at {:.1} s: {}\n", stand.time_s, stand.why);
+    }
+    text
+}

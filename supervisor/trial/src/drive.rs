@@ -1,0 +1,276 @@
+//! Drives a log through the link, dead reckoning and the mapper.
+
+use common::{
+    clock::{MissionTime, Pace},
+    grid::GridFrame,
+    json_wire::{Report, line},
+    kinematics::Pose2,
+    mission::{Mission, MissionError, Sensor},
+    samples::{Action, Cause, CommandSample, CommandState, HoldReason, Order, PoseSample},
+    stage::Answering as _,
+    stop_socket::Request,
+};
+use dead_reckoning::{DeadReckoning, Sources};
+use glam::DVec2;
+use link::step::{Effect, Entry, Event, Link, State};
+use mapper::step::{Input, Mapper, Scan, Tick};
+
+use crate::{Instant, Log, between, moved};
+
+/// Mission time of the log's first instant.
+const BEGINS_NS: u64 = 1_000_000_000;
+/// Interval of the link's turns without input.
+const LOOKS_NS: u64 = 20_000_000;
+/// Longest pause of a log in which the link takes its turns.
+const MOST_LOOKS: u64 = 500;
+/// Fastest rate of a robot's reports.
+const RATES_HZ: [f64; 2] = [1.0, 10.0];
+/// Longest pause of a log that is no silence of its robot, seconds.
+const LONGEST_PAUSE_S: f64 = 5.0;
+/// Space around the odometry, metres.
+const AROUND_M: f64 = 15.0;
+
+/// What a log's pause looks like: no fault of the robot.
+const PAUSES: [Cause; 3] = [Cause::CommandStale, Cause::FramesSilent, Cause::RangeSilent];
+
+/// Stand of the link's failsafe, except during a log's pause.
+#[derive(Debug)]
+pub struct Stand {
+    /// Since the start of the log.
+    pub time_s: f64,
+    pub why: String,
+}
+
+/// What came of a log.
+#[derive(Debug)]
+pub struct Drive {
+    /// Where the robot believes to be at each scan, once it is matched.
+    pub poses: Vec<PoseSample>,
+    /// True poses of the same times; none without corrected poses.
+    pub references: Option<Vec<Pose2>>,
+    pub fixes: usize,
+    pub stands: Vec<Stand>,
+    pub laser: Sensor,
+    pub frame: GridFrame,
+    /// Map, one byte a cell.
+    pub cells: Vec<u8>,
+}
+
+/// Returns the mission of a robot that gives such a log, around the places of its odometry.
+///
+/// `robot` holds the tables of a robot of one's own.
+///
+/// # Errors
+/// If they are no mission.
+pub fn mission(log: &Log, robot: Option<&str>) -> Result<Mission, MissionError> {
+    let places = || log.instants.iter().map(|it| it.odometry.position);
+    let [least, most] = [DVec2::min, DVec2::max].map(|of| places().fold(DVec2::ZERO, of));
+    let (centre, size) = ((least + most) / 2.0, most - least);
+    let width_m = size.max_element() + 2.0 * AROUND_M;
+    let periods = |of: &dyn Fn(&&Instant) -> bool| {
+        let times: Vec<f64> = log.instants.iter().filter(of).map(|it| it.time_s).collect();
+        let mut periods: Vec<f64> = times.windows(2).map(|it| it[1] - it[0]).collect();
+        periods.sort_by(f64::total_cmp);
+        periods
+    };
+    let (reports, scans) = (periods(&|_| true), periods(&|it| it.scan.is_some()));
+    let period_s = reports.get(reports.len() / 2).copied().unwrap_or(1.0);
+    let rate_hz = period_s.recip().clamp(RATES_HZ[0], RATES_HZ[1]);
+    // A log may hold fewer scans than its robot gave.
+    let longest_s = scans.iter().chain(&reports).copied().fold(0.0, f64::max);
+    let limit_s = longest_s.clamp(2.0 / rate_hz, LONGEST_PAUSE_S);
+    let beams = log.beams();
+    let own = format!(
+        "[robot]\nprotocol = 'json'\nrate_hz = {rate_hz:.2}\ncommand_limit_s = {limit_s:.2}\n\
+        [[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\n\
+        field_of_view_deg = 180\nreach_m = 30\nbeams = {beams}\n"
+    );
+    let [x, y] = centre.to_array();
+    let target = places().last().unwrap_or_default();
+    let text = format!(
+        "target = [{:.3}, {:.3}]\nperimeter.width_m = {width_m:.1}\nperimeter.centre = [{x:.1}, {y:.1}]\n{}",
+        target.x,
+        target.y,
+        robot.unwrap_or(&own)
+    );
+    Mission::parse(&text, "log.toml")
+}
+
+/// Returns the line that a robot sends at an instant.
+fn said(instant: &Instant, speeds: [f64; 2], heard: u64) -> Vec<u8> {
+    let Pose2 { position, heading } = instant.odometry;
+    let scan = instant.scan.as_ref();
+    let ranges = |scan: &Vec<f32>| scan.iter().map(|range| Some(*range)).collect();
+    line(&Report {
+        heard: Some(heard),
+        odometry: Some([position.x, position.y, heading]),
+        speeds: Some(speeds),
+        scan: scan.map(ranges),
+        ..Report::default()
+    })
+}
+
+struct Driver<'a> {
+    mission: &'a Mission,
+    link: Link,
+    reckoning: DeadReckoning,
+    mapper: Mapper,
+    sources: Sources,
+    heard: u64,
+    tick: u64,
+    now_ns: u64,
+    stands: Vec<Stand>,
+    pose: PoseSample,
+}
+
+/// Drives a log by a mission's robot.
+pub fn drive(log: &Log, mission: &Mission) -> Option<Drive> {
+    let (_, laser) = mission.laser()?;
+    let mut link = Link::new(mission);
+    link.restore(State { pace: Pace::Rate(1.0), next_tick: 0 });
+    let mut driver = Driver {
+        mission,
+        link,
+        reckoning: DeadReckoning::new(mission),
+        mapper: Mapper::new(mission),
+        sources: Sources::default(),
+        heard: 0,
+        tick: 0,
+        now_ns: BEGINS_NS,
+        stands: Vec::new(),
+        pose: PoseSample::default(),
+    };
+    let first = log.instants.first()?;
+    let (mut poses, mut fixes) = (Vec::new(), 0);
+    for (index, instant) in log.instants.iter().enumerate() {
+        let next = log.instants.get(index + 1).unwrap_or(instant);
+        driver.wait_until(BEGINS_NS + ((instant.time_s - first.time_s) * 1e9) as u64);
+        driver.take(instant, next);
+        if instant.scan.is_some() {
+            let mut pose = driver.pose;
+            if let Some(fix) = driver.sources.fixes.last() {
+                fixes += 1;
+                (pose.x_m, pose.y_m, pose.heading_rad) = (fix.x_m, fix.y_m, fix.heading_rad);
+                pose.covariance = fix.covariance;
+            }
+            poses.push(pose);
+        }
+    }
+    let scanned = || log.instants.iter().filter(|it| it.scan.is_some());
+    let start = scanned().next()?.laser;
+    let arm = Pose2 {
+        position: laser.mount.forward_m * DVec2::from_angle(laser.mount.bearing_rad),
+        heading: 0.0,
+    };
+    let back = between(arm, Pose2::default());
+    let body = |pose: Pose2| moved(arm, moved(between(start, pose), back));
+    let references = log.is_corrected.then(|| scanned().map(|it| body(it.laser)).collect());
+    let Driver { mapper, stands, .. } = driver;
+    Some(Drive {
+        poses,
+        references,
+        fixes,
+        stands,
+        laser,
+        frame: mapper.frame(),
+        cells: mapper.state().cells.clone(),
+    })
+}
+
+impl Driver<'_> {
+    fn wait_until(&mut self, until_ns: u64) {
+        let looks = (until_ns.saturating_sub(self.now_ns) / LOOKS_NS).min(MOST_LOOKS);
+        for look in (0..looks).rev() {
+            self.now_ns = until_ns - (look + 1) * LOOKS_NS;
+            self.order();
+        }
+        self.now_ns = until_ns;
+    }
+
+    fn take(&mut self, instant: &Instant, next: &Instant) {
+        let body = self.mission.body();
+        let Pose2 { position, heading } = between(instant.odometry, next.odometry);
+        let way_m = position.length().copysign(position.x);
+        let seconds = (next.time_s - instant.time_s).max(LOOKS_NS as f64 * 1e-9);
+        let speeds = [-1.0, 1.0].map(|side| {
+            (way_m + side * heading * body.track_m / 2.0) / seconds / body.wheel_radius_m
+        });
+        debug_assert!(speeds.iter().all(|it| it.is_finite()));
+        self.order();
+        let bytes = said(instant, speeds, self.heard);
+        self.give(Event::Datagram(&bytes));
+        let mut command = CommandSample {
+            left_rad_s: speeds[0],
+            right_rad_s: speeds[1],
+            v_m_s: way_m / seconds,
+            omega_rad_s: heading / seconds,
+            pose_ns: self.now_ns,
+            guidance_ns: self.now_ns,
+            state: CommandState::Driving.into(),
+            ..CommandSample::default()
+        };
+        (command.stamp.tick, command.stamp.stamp_ns) = (self.tick, self.now_ns);
+        self.give(Event::Command(command));
+        self.give(Event::Quiet);
+    }
+
+    /// Lets the link take a turn of a robot that is ordered to drive.
+    fn order(&mut self) {
+        self.give(Event::Order(Order::Drive, HoldReason::None));
+        self.give(Event::Quiet);
+    }
+
+    fn give(&mut self, event: Event<'_>) {
+        let now = MissionTime(self.now_ns);
+        for effect in self.link.step(Entry { event, machine_ns: self.now_ns, now }) {
+            match effect {
+                Effect::Send(bytes) => {
+                    self.heard += bytes.iter().filter(|byte| **byte == b'\n').count() as u64;
+                }
+                Effect::Tick {
+                    tick, ranges, scans, turn, mut wheels, endless, contact, ..
+                } => {
+                    self.tick = tick;
+                    (wheels.stamp.tick, wheels.stamp.stamp_ns) = (tick, now.0);
+                    self.sources.turns = turn.into_iter().collect();
+                    self.sources.counts = endless.into_iter().collect();
+                    self.sources.counts.iter_mut().for_each(|it| it.stamp = wheels.stamp);
+                    let mut pose = self.reckoning.answer(&wheels, &self.sources, now).sample;
+                    pose.stamp = wheels.stamp;
+                    self.pose = pose;
+                    let scan = |it: common::driver::LaserScan| Scan {
+                        row: it.row,
+                        beams: it.beams,
+                        sweep: it.sweep,
+                    };
+                    let scans = scans.into_iter().map(scan).collect();
+                    let contact = contact.map(|it| *it);
+                    let tick = Tick { pose, ranges, scans, contact, ..Tick::default() };
+                    self.mapper.step(Input::Tick(tick), now);
+                    self.sources.fixes = self.mapper.take_fix().into_iter().collect();
+                }
+                Effect::Decided { before, now: decision } => {
+                    let stands =
+                        decision.action >= Action::Stop && !PAUSES.contains(&decision.cause);
+                    if stands && before.action < Action::Stop {
+                        let words = self.link.explain(decision.cause, self.now_ns);
+                        let why = words.unwrap_or_else(|| decision.cause.name().to_owned());
+                        let time_s = (self.now_ns - BEGINS_NS) as f64 * 1e-9;
+                        self.stands.push(Stand { time_s, why });
+                        self.resume();
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// Resumes, as an operator does who finds nothing wrong.
+    fn resume(&mut self) {
+        for request in [Request::Stop, Request::Resume] {
+            let now = MissionTime(self.now_ns);
+            let event = Event::Operator(request);
+            self.link.step(Entry { event, machine_ns: self.now_ns, now });
+        }
+    }
+}
