@@ -44,17 +44,23 @@ use self::monitor::{Clears, Moment, Monitor, Observation};
 macro_rules! monitors {
     ($($name:ident: $monitor:ty,)*) => {
         #[derive(Clone, Debug)]
-        pub(crate) struct Monitors {
+        pub(crate) struct Failsafe {
             $(pub(crate) $name: $monitor,)*
+            applied: [bool; TABLE.len()],
         }
 
-        impl Monitors {
+        impl Failsafe {
             pub(crate) fn new(mission: &Mission) -> Self {
-                Self { $($name: <$monitor>::new(mission),)* }
+                Self { $($name: <$monitor>::new(mission),)* applied: [false; TABLE.len()] }
             }
 
             pub(crate) fn observe(&mut self, what: &Observation<'_>, now: Moment) {
                 $(self.$name.observe(what, now);)*
+                if matches!(what, Observation::Resumed) {
+                    for (applied, rule) in self.applied.iter_mut().zip(TABLE) {
+                        *applied &= !matches!(rule.clears, Clears::OnResume { .. });
+                    }
+                }
             }
 
             pub(crate) fn doubts(&self) -> DoubtsSample {
@@ -93,7 +99,7 @@ pub struct Rule {
     /// It counts from the operator's stop if the robot ignores that. None if unbounded, or if an
     /// operator or another commander acts.
     known_within_s: Option<fn(&Mission) -> f64>,
-    monitor: fn(&Monitors) -> &dyn Monitor,
+    monitor: fn(&Failsafe) -> &dyn Monitor,
 }
 
 /// Command limit: without frames there are no ticks, and without ticks no commands.
@@ -204,26 +210,7 @@ pub fn rule(cause: Cause) -> Option<&'static Rule> {
     TABLE.iter().find(|rule| rule.cause == cause)
 }
 
-#[derive(Clone, Debug)]
-pub(crate) struct Failsafe {
-    pub monitors: Monitors,
-    applied: [bool; TABLE.len()],
-}
-
 impl Failsafe {
-    pub(crate) fn new(mission: &Mission) -> Self {
-        Self { monitors: Monitors::new(mission), applied: [false; TABLE.len()] }
-    }
-
-    pub(crate) fn observe(&mut self, what: &Observation<'_>, now: Moment) {
-        self.monitors.observe(what, now);
-        if matches!(what, Observation::Resumed) {
-            for (applied, rule) in self.applied.iter_mut().zip(TABLE) {
-                *applied &= !matches!(rule.clears, Clears::OnResume { .. });
-            }
-        }
-    }
-
     /// Decides what to do now. Monitors of frames are skipped in lockstep and while the robot is
     /// silent.
     pub(crate) fn decide(&mut self, lockstep: bool, now: Moment) -> Decision {
@@ -240,10 +227,10 @@ impl Failsafe {
 
     /// Returns None where the monitor is skipped.
     fn applying(&self, lockstep: bool, now: Moment) -> [Option<bool>; TABLE.len()] {
-        let judges_frames = !lockstep && self.monitors.presence.connected;
+        let judges_frames = !lockstep && self.presence.connected;
         std::array::from_fn(|row| {
             let rule = &TABLE[row];
-            let monitor = (rule.monitor)(&self.monitors);
+            let monitor = (rule.monitor)(self);
             let is_asked = judges_frames || !monitor.judges_frames();
             let applies =
                 || rule.clears.applies(self.applied[row], monitor.condition(rule.cause, now));
@@ -257,7 +244,7 @@ impl Failsafe {
     }
 
     pub(crate) fn explain(&self, cause: Cause, now: Moment) -> Option<String> {
-        (rule(cause)?.monitor)(&self.monitors).explain(cause, now)
+        (rule(cause)?.monitor)(self).explain(cause, now)
     }
 }
 

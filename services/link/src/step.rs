@@ -28,7 +28,7 @@ use crate::{
     clock_rate::ClockRate,
     drivers,
     failsafe::{
-        Decision, Failsafe, Monitors,
+        Decision, Failsafe,
         monitor::{Moment, Observation},
         odometry::Odometry,
         presence::Absence,
@@ -172,7 +172,7 @@ impl Link {
     pub(crate) fn doubts(&self) -> DoubtsSample {
         match self.in_ticks() {
             true => DoubtsSample::default(),
-            false => self.failsafe.monitors.doubts(),
+            false => self.failsafe.doubts(),
         }
     }
 
@@ -198,9 +198,9 @@ impl Link {
             Event::SensorWire(number, open) => self.take_sensor_wire(number, open),
             Event::Command(command) => self.take_command(&command),
             Event::Order(order, reason) => self.take_order(order, reason),
-            Event::Operator(Request::Stop) => self.failsafe.monitors.orders.stopped_here = true,
+            Event::Operator(Request::Stop) => self.failsafe.orders.stopped_here = true,
             Event::Operator(Request::Resume) => {
-                self.failsafe.monitors.orders.stopped_here = false;
+                self.failsafe.orders.stopped_here = false;
                 self.observe(Observation::Resumed);
             }
             Event::TickLimit { last_tick, target_number } => {
@@ -237,7 +237,7 @@ impl Link {
     }
 
     pub fn connected(&self) -> bool {
-        self.failsafe.monitors.presence.connected
+        self.failsafe.presence.connected
     }
 
     pub fn wire_tally(&self) -> WireTally {
@@ -259,7 +259,7 @@ impl Link {
     pub fn rest(&self) -> Rest {
         match (self.in_ticks(), self.connected()) {
             (true, _) if self.decision.stops() => Rest::AtRest,
-            (false, true) => self.failsafe.monitors.stop.rest(self.now),
+            (false, true) => self.failsafe.stop.rest(self.now),
             _ => Rest::Unknown,
         }
     }
@@ -269,15 +269,15 @@ impl Link {
     }
 
     pub fn absence(&self, now_ns: u64) -> Absence {
-        self.failsafe.monitors.presence.absence(now_ns)
+        self.failsafe.presence.absence(now_ns)
     }
 
     pub fn losses(&self) -> u64 {
-        self.failsafe.monitors.presence.losses
+        self.failsafe.presence.losses
     }
 
     pub fn owes_stop(&self, before: bool) -> bool {
-        let moves = self.failsafe.monitors.stop.is_told_to_move();
+        let moves = self.failsafe.stop.is_told_to_move();
         !self.in_ticks() && is_owed(before, moves, self.is_at_rest())
     }
 
@@ -287,7 +287,7 @@ impl Link {
     }
 
     pub const fn is_stopped_by_operator(&self) -> bool {
-        self.failsafe.monitors.orders.stopped_here
+        self.failsafe.orders.stopped_here
     }
 
     fn final_stops(&self) -> Vec<Effect> {
@@ -313,13 +313,13 @@ impl Link {
     }
 
     fn ordered_to_drive(&self) -> bool {
-        self.failsafe.monitors.orders.drive()
+        self.failsafe.orders.drive()
     }
 
     /// Returns whether a held robot's ticks continue, so that it may be carried. In lockstep
     /// mission time stands still.
     fn stands_by(&self) -> bool {
-        !self.in_ticks() && self.failsafe.monitors.orders.stands_by()
+        !self.in_ticks() && self.failsafe.orders.stands_by()
     }
 
     fn in_ticks(&self) -> bool {
@@ -348,7 +348,7 @@ impl Link {
             self.state.next_tick += 1;
         }
         let endless = motion.endless;
-        let Monitors { odometry: Odometry { shares, .. }, range, .. } = &self.failsafe.monitors;
+        let Failsafe { odometry: Odometry { shares, .. }, range, .. } = &self.failsafe;
         let WheelRatio { ratio, deviation } = shares.ratio();
         let [by_commands, by_ranges] = [shares.untold_m(), range.untold_m()];
         let wheels = WheelSample {
@@ -369,9 +369,8 @@ impl Link {
             let capture_ns = self.now.0;
             TurnSample { capture_ns, sequence, turn_rad, variance_rad2, ..TurnSample::default() }
         });
-        let monitors = &mut self.failsafe.monitors;
-        let contact = monitors.odometry.contacts.new.take();
-        let contact = contact.or_else(|| monitors.touch.take_contact(self.now));
+        let contact = self.failsafe.odometry.contacts.new.take();
+        let contact = contact.or_else(|| self.failsafe.touch.take_contact(self.now));
         let effect = Effect::Tick {
             tick: self.open_number(),
             time: self.now,
@@ -381,7 +380,7 @@ impl Link {
             wheels,
             endless,
             contact: contact.map(Box::new),
-            response: self.failsafe.monitors.base.sample().map(Box::new),
+            response: self.failsafe.base.sample().map(Box::new),
         };
         self.open = Some(OpenTick { effect, began_ns: self.now_ns, given_ns: None });
         self.give_tick();
@@ -414,7 +413,7 @@ impl Link {
             CommandState::Driving => {
                 let reached = self.trim.as_ref().map_or(1.0, SpeedTrim::share);
                 assert!(reached > 0.0 && reached <= 1.0);
-                let permitted = self.failsafe.monitors.touch.permitted(command, self.now);
+                let permitted = self.failsafe.touch.permitted(command, self.now);
                 self.speeds.of(&permitted, share / reached, &self.wheels)
             }
             CommandState::Halt | CommandState::Arrived => [0, 0],
@@ -451,7 +450,7 @@ impl Link {
             return;
         }
         let drives = order == Order::Drive && !self.ordered_to_drive();
-        if drives && self.failsafe.monitors.orders.by_operator() {
+        if drives && self.failsafe.orders.by_operator() {
             self.observe(Observation::Resumed);
         }
         self.observe(Observation::Directive(order, reason));

@@ -58,13 +58,13 @@ impl Failsafe {
     }
 
     fn loses_the_robot(&mut self) {
-        self.monitors.presence.lose(now().machine_ns);
+        self.presence.lose(now().machine_ns);
     }
 
     fn jumps(&mut self, ms_ago: u64) {
         for _ in 0..3 {
             let jump = Motor([0; 2].into(), Counts::Implausible);
-            self.monitors.odometry.observe(&jump, ago(ms_ago * MS));
+            self.odometry.observe(&jump, ago(ms_ago * MS));
         }
     }
 
@@ -72,7 +72,7 @@ impl Failsafe {
         self.sees(Commanded([0, 0]), 5000);
         for frame in 1..=30_u16 {
             let when = ago(u64::from(4100 - 100 * frame) * MS);
-            self.monitors.stop.observe(&counts(50 * frame), when);
+            self.stop.observe(&counts(50 * frame), when);
         }
     }
 
@@ -81,7 +81,7 @@ impl Failsafe {
         for tick in 0..10 {
             let reading = [reading(0, Some(f64::from(range_cm(tick)) / 100.0))];
             for what in [Readings(&reading), counts(counts_per_tick * tick)] {
-                self.monitors.range.observe(&what, now());
+                self.range.observe(&what, now());
             }
         }
     }
@@ -98,7 +98,7 @@ impl Failsafe {
 /// Returns a failsafe without any cause, all inputs at their age limit.
 fn well() -> Failsafe {
     let mut failsafe = Failsafe::new(&front_only());
-    failsafe.monitors.presence.heard(now().machine_ns);
+    failsafe.presence.heard(now().machine_ns);
     failsafe.sees(Pace(Pace::Rate(1.0)), 0);
     failsafe.observe(&DRIVE, ago(orders::SUPERVISOR_SILENT.as_nanos() as u64));
     for what in [FOUND, boards(7.2), Readings(&[reading(0, None)])] {
@@ -112,7 +112,7 @@ type Break = fn(&mut Failsafe);
 
 fn wheels_are_held(failsafe: &mut Failsafe) {
     for frame in (0..=10).rev() {
-        let odometry = &mut failsafe.monitors.odometry;
+        let odometry = &mut failsafe.odometry;
         for what in [Currents([1500; 2]), counts(0), Commanded([1200; 2])] {
             odometry.observe(&what, ago(100 * frame * MS));
         }
@@ -126,7 +126,7 @@ const fn commander(moves: bool) -> Observation<'static> {
 /// Omits infrared-1, which looks into the front sonar's cone.
 fn without_an_infrared_ranger(failsafe: &mut Failsafe) {
     let readings = [0, 1, 2, 3, 5, 6, 7, 8, 9].map(|sensor| reading(sensor, None));
-    failsafe.monitors.streams = Monitor::new(&mission(""));
+    failsafe.streams = Monitor::new(&mission(""));
     failsafe.sees(FOUND, 0);
     failsafe.sees(Readings(&readings), 0);
 }
@@ -140,7 +140,7 @@ const CASES: &[(Break, Cause)] = &[
     (Failsafe::does_not_stop, Cause::RobotDoesNotStop),
     (|it| it.is_held(HoldReason::Operator), Cause::OperatorStop),
     (|it| it.is_held(HoldReason::StageHeld), Cause::StageHeld),
-    (|it| it.monitors.orders = Monitor::new(&front_only()), Cause::NotOrdered),
+    (|it| it.orders = Monitor::new(&front_only()), Cause::NotOrdered),
     (|it| it.is_held(HoldReason::None), Cause::NotOrdered),
     (
         |it| it.observe(&DRIVE, ago(orders::SUPERVISOR_SILENT.as_nanos() as u64 + 1)),
@@ -152,7 +152,7 @@ const CASES: &[(Break, Cause)] = &[
     (
         |it| {
             for frame in (0..10).rev() {
-                it.monitors.streams.observe(&counts(0), ago(300 * frame * MS));
+                it.streams.observe(&counts(0), ago(300 * frame * MS));
             }
         },
         Cause::FramesSlow,
@@ -161,8 +161,8 @@ const CASES: &[(Break, Cause)] = &[
     (wheels_are_held, Cause::WheelsHeld),
     (
         |it| {
-            it.monitors.touch = Monitor::new(&mission("robot.model = 'kobuki'"));
-            it.monitors.touch.observe(&Commanded([100; 2]), now());
+            it.touch = Monitor::new(&mission("robot.model = 'kobuki'"));
+            it.touch.observe(&Commanded([100; 2]), now());
             it.sees(Touched(&[(0, true)]), 0);
         },
         Cause::Felt,
@@ -177,7 +177,7 @@ const CASES: &[(Break, Cause)] = &[
     ),
     (|it| it.ranges(|_| 100, 200), Cause::RangeImplausible),
     (|it| it.ranges(|tick| 100 + 6 * (tick % 2), 120), Cause::RangeDoubtful),
-    (|it| it.monitors.staleness = Monitor::new(&front_only()), Cause::CommandStale),
+    (|it| it.staleness = Monitor::new(&front_only()), Cause::CommandStale),
     (|it| it.takes_command([STALE, 0, 0]), Cause::CommandStale),
     (|it| it.takes_command([0, STALE, 0]), Cause::PoseStale),
     (|it| it.takes_command([0, now().machine_ns, 0]), Cause::PoseStale),
@@ -254,7 +254,7 @@ fn in_lockstep_and_while_the_robot_is_away_its_frames_are_not_judged() {
         assert_eq!(away.cause(), Cause::RobotLost);
     }
     for &(by, cause) in CASES {
-        let judges_frames = (rule(cause).unwrap().monitor)(&well().monitors).judges_frames();
+        let judges_frames = (rule(cause).unwrap().monitor)(&well()).judges_frames();
         if !judges_frames && ![Cause::CommandStale, Cause::RobotLost].contains(&cause) {
             assert_eq!(broken(by).decide(true, now()).cause, cause);
         }
@@ -361,21 +361,17 @@ fn a_slow_base_drives_at_half_speed_until_a_command_follows_from_what_was_found(
     failsafe.sees(Responds(LATE), 0);
     failsafe.takes_command([0, 1, 0]);
     assert_eq!(failsafe.cause(), Cause::BaseSlow);
-    let told = failsafe.monitors.base.sample().unwrap();
+    let told = failsafe.base.sample().unwrap();
     assert!(told.dead_time_s >= LATE.dead_time_s(), "{told:?}");
     failsafe.takes_command([0; 3]);
     assert_eq!(failsafe.decides(), Decision::GO);
-    assert!(failsafe.monitors.base.sample().is_some(), "a restarted stage needs it");
+    assert!(failsafe.base.sample().is_some(), "a restarted stage needs it");
     for set in ["method = 'paper'", "planner.executable = './mine'"] {
         let mut failsafe = well();
-        failsafe.monitors.base = Monitor::new(&mission(set));
+        failsafe.base = Monitor::new(&mission(set));
         failsafe.sees(Responds(LATE), 0);
         failsafe.takes_command([0; 3]);
-        assert_eq!(
-            (failsafe.cause(), failsafe.monitors.base.sample()),
-            (Cause::BaseSlow, None),
-            "{set}"
-        );
+        assert_eq!((failsafe.cause(), failsafe.base.sample()), (Cause::BaseSlow, None), "{set}");
     }
 }
 
@@ -383,7 +379,7 @@ fn a_slow_base_drives_at_half_speed_until_a_command_follows_from_what_was_found(
 fn acknowledgements_of_what_was_not_sent_show_another_commander_and_late_or_doubled_ones_do_not() {
     // Each window ends with 50 commands; the robot acknowledges `count`.
     let after = |failsafe: &mut Failsafe, windows: std::ops::Range<u64>, count: usize| {
-        let monitor = &mut failsafe.monitors.commander;
+        let monitor = &mut failsafe.commander;
         for when in windows.map(|window| ago((20 - 2 * window) * 1000 * MS)) {
             monitor.observe(&Owed(50), when);
             (0..count).for_each(|_| monitor.observe(&Acknowledged, when));
@@ -392,7 +388,7 @@ fn acknowledgements_of_what_was_not_sent_show_another_commander_and_late_or_doub
         failsafe.cause()
     };
     let mut failsafe = Failsafe::new(&front_only());
-    failsafe.monitors.presence.heard(now().machine_ns);
+    failsafe.presence.heard(now().machine_ns);
     let none = after(&mut failsafe, 0..3, 50 + commander::UNOWED - 1);
     assert_ne!(none, Cause::AnotherCommander, "a few came twice");
     assert_eq!(after(&mut failsafe, 3..4, 50 + commander::UNOWED), Cause::AnotherCommander);

@@ -19,7 +19,7 @@ impl Link {
     pub(crate) fn is_calm_until(&self, then: Moment) -> bool {
         !self.in_ticks()
             && !self.decision.stops()
-            && !self.failsafe.monitors.presence.is_silent(then.machine_ns)
+            && !self.failsafe.presence.is_silent(then.machine_ns)
             && self.failsafe.foresee(false, then) == self.decision
     }
 
@@ -30,7 +30,7 @@ impl Link {
     }
 
     fn polls_by_time(&self) -> bool {
-        self.base.is_polled() && !self.in_ticks() && self.failsafe.monitors.presence.wire_open
+        self.base.is_polled() && !self.in_ticks() && self.failsafe.presence.wire_open
     }
 
     /// Polls in lockstep after each command and ping; the robot begins one tick however many came.

@@ -25,7 +25,7 @@ impl Link {
         if now.cause == Cause::AnotherCommander {
             // The wheels obey the other commander.
             let now = self.moment();
-            self.failsafe.monitors.odometry.observe(&Observation::Resumed, now);
+            self.failsafe.odometry.observe(&Observation::Resumed, now);
         }
         if now.stops() {
             self.repeat = None;
@@ -35,7 +35,7 @@ impl Link {
                 }
                 // The robot may still obey a command of an earlier link.
                 let new = !before.stops()
-                    || self.stop_sent_ns.is_none() && self.failsafe.monitors.presence.wire_open;
+                    || self.stop_sent_ns.is_none() && self.failsafe.presence.wire_open;
                 self.send_stop(new);
             }
         }
@@ -46,7 +46,7 @@ impl Link {
 
     /// In counts/s.
     pub(super) fn tell(&mut self, counts: [i16; 2], limit: Duration) {
-        if self.failsafe.monitors.stop.method > 0 && counts != [0, 0] {
+        if self.failsafe.stop.method > 0 && counts != [0, 0] {
             // Another stop method may have changed the robot's settings.
             self.send(self.base.greeting());
         }
@@ -59,10 +59,10 @@ impl Link {
         let does_not_stop = self.failsafe.applied(Cause::RobotDoesNotStop);
         if new {
             self.effects.extend(self.final_stops());
-        } else if self.failsafe.monitors.latency.is_testing() && self.stop_sent_ns.is_some() {
+        } else if self.failsafe.latency.is_testing() && self.stop_sent_ns.is_some() {
             // The latency monitor waits for late acknowledgements.
             return;
-        } else if self.failsafe.monitors.stop.takes_next_method(does_not_stop, self.now) {
+        } else if self.failsafe.stop.takes_next_method(does_not_stop, self.now) {
             self.send(self.stop());
             let method = self.other_stop().map_or("velocity 0", |other| other.name);
             self.effects.push(Effect::StopBy(method));
@@ -96,7 +96,7 @@ impl Link {
     /// Returns None for velocity 0, the first method, which also follows the last.
     pub(super) fn other_stop(&self) -> Option<StopMethod> {
         // Usually nothing needs encoding.
-        let method = Some(self.failsafe.monitors.stop.method).filter(|method| *method > 0)?;
+        let method = Some(self.failsafe.stop.method).filter(|method| *method > 0)?;
         let mut others = self.base.other_stops();
         let method = method % (others.len() + 1);
         method.checked_sub(1).map(|other| others.swap_remove(other))

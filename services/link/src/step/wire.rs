@@ -18,7 +18,7 @@ const LONGEST_REFUSAL: usize = 200;
 
 impl Link {
     pub(super) fn take_wire(&mut self, open: bool) {
-        self.failsafe.monitors.presence.wire(open);
+        self.failsafe.presence.wire(open);
         self.base.reset();
         // Bytes for a closed wire are lost.
         self.stop_sent_ns = None;
@@ -74,7 +74,7 @@ impl Link {
         if let Some(commander) = heard.commander {
             self.observe(Observation::Commander(commander));
         }
-        let is_told = std::mem::take(&mut self.failsafe.monitors.commander.is_told);
+        let is_told = std::mem::take(&mut self.failsafe.commander.is_told);
         // The robot obeys the newest command, so each of another commander gets a stop. At the
         // first one, the failsafe stops it below.
         if (is_told || heard.commander.is_some_and(|commander| commander.moves))
@@ -110,7 +110,7 @@ impl Link {
         if !heard.touched.is_empty() {
             self.observe(Observation::Touched(&heard.touched));
         }
-        if heard.anything && self.failsafe.monitors.presence.heard(self.now_ns) {
+        if heard.anything && self.failsafe.presence.heard(self.now_ns) {
             let again = self.losses() > 0;
             self.observe(Observation::Found { again });
             self.effects.push(Effect::Connected(true));
@@ -154,17 +154,16 @@ impl Link {
     }
 
     fn tell_response(&mut self) {
-        if let Some(response) = self.failsafe.monitors.odometry.found.take() {
+        if let Some(response) = self.failsafe.odometry.found.take() {
             self.observe(Observation::Responds(response));
-            let base = &self.failsafe.monitors.base;
-            self.effects.extend(base.words().map(Effect::FoundResponse));
+            self.effects.extend(self.failsafe.base.words().map(Effect::FoundResponse));
         }
     }
 
     /// Judges a lockstep tick's motion: contacts, wheel shares, and an unstated response.
     pub(super) fn judge_tick(&mut self, motion: &Motion) {
         let now = self.moment();
-        let odometry = &mut self.failsafe.monitors.odometry;
+        let odometry = &mut self.failsafe.odometry;
         odometry.observe(&Observation::Currents(motion.currents), now);
         odometry.observe(&Observation::Motor(cyclic(motion), Counts::Follow), now);
         // A simulated X80 answers as stated.
@@ -196,7 +195,7 @@ impl Link {
         if let Some(power) = heard.power {
             let volts = [power.board_v, power.motor_v, power.servo_v];
             self.observe(Observation::Batteries(volts));
-            let battery = &mut self.failsafe.monitors.battery;
+            let battery = &mut self.failsafe.battery;
             let [board_low, motor_low, servo_low] = battery.low().map(u8::from);
             self.effects.push(Effect::Power(PowerSample {
                 board_low,
@@ -212,14 +211,14 @@ impl Link {
 
     pub(super) fn ping(&mut self) {
         self.pinged_ns = Some(self.now_ns);
-        self.failsafe.monitors.presence.pinged(self.now_ns);
+        self.failsafe.presence.pinged(self.now_ns);
         self.due += 1;
         self.send(self.base.ping());
         self.poll_in_ticks();
     }
 
     pub(super) fn keep_connected(&mut self) {
-        let silent = self.failsafe.monitors.presence.is_silent(self.now_ns);
+        let silent = self.failsafe.presence.is_silent(self.now_ns);
         // A robot that waits for a command is present: if its next motor frame is missing, a
         // datagram was lost.
         let owes = self.ordered_to_drive() && self.open.is_none();
@@ -228,9 +227,9 @@ impl Link {
         }
         if !self.in_ticks()
             && self.connected()
-            && !self.failsafe.monitors.latency.is_testing()
+            && !self.failsafe.latency.is_testing()
             && self.other_stop().is_none()
-            && self.failsafe.monitors.streams.wants_request(self.now_ns)
+            && self.failsafe.streams.wants_request(self.now_ns)
         {
             self.send(self.base.ask_for_sensors());
             let greetings = (0..).zip(self.drivers.iter().map(|driver| driver.greeting()));
@@ -238,7 +237,7 @@ impl Link {
             self.effects.push(Effect::AskedForStreams);
         }
         let owing = self.in_ticks() && owes && silent && self.connected();
-        if self.failsafe.monitors.presence.wants_ping(self.now_ns) {
+        if self.failsafe.presence.wants_ping(self.now_ns) {
             self.ping();
         } else if owing && self.passed(self.pinged_ns, PING_EVERY) {
             self.due = 0;
@@ -247,7 +246,7 @@ impl Link {
     }
 
     pub(super) fn lose(&mut self) {
-        if !self.failsafe.monitors.presence.lose(self.now_ns) {
+        if !self.failsafe.presence.lose(self.now_ns) {
             return;
         }
         self.restart.away = true;

@@ -325,7 +325,7 @@ impl World {
         let machine_ns = self.now_ns;
         let moment = Moment { time: MissionTime(machine_ns), machine_ns, ..Moment::default() };
         let (link, supervisor) = (&self.link, &self.supervisor);
-        let all = &link.failsafe.monitors;
+        let all = &link.failsafe;
         let applied = Vec::from_iter(TABLE.iter().map(|row| link.failsafe.applied(row.cause)));
         let does_not_stop = all.stop.condition(Cause::RobotDoesNotStop, moment);
         let presence = (all.presence.connected, all.presence.is_silent(self.now_ns));
