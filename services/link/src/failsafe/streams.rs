@@ -4,7 +4,7 @@
 //! Without one infrared ranger that looks aside or into a sonar's cone, the robot drives at half
 //! speed. The sonar covers the cone, and unscanned ground is looked at before it is driven on.
 
-use std::{collections::VecDeque, time::Duration};
+use std::time::Duration;
 
 use common::{
     clock::MissionTime,
@@ -55,7 +55,8 @@ pub struct Streams {
     found_ns: u64,
     motor_ns: u64,
     newest: Option<MissionTime>,
-    intervals: VecDeque<Duration>,
+    /// Oldest first; None before a robot just found has sent so many.
+    intervals: [Option<Duration>; INTERVALS],
     requests: Backoff,
 }
 
@@ -63,10 +64,8 @@ impl Streams {
     fn motor(&mut self, now: MissionTime, now_ns: u64) {
         self.motor_ns = now_ns;
         if let Some(before) = self.newest.replace(now) {
-            self.intervals.push_back(now.since(before));
-        }
-        if self.intervals.len() > INTERVALS {
-            self.intervals.pop_front();
+            self.intervals.rotate_left(1);
+            self.intervals[INTERVALS - 1] = Some(now.since(before));
         }
     }
 
@@ -75,15 +74,14 @@ impl Streams {
         if self.silence.is_over(since, now_ns) {
             return Motor::Silent;
         }
-        let mut sorted = [Duration::ZERO; INTERVALS];
-        assert!(self.intervals.len() <= INTERVALS);
-        sorted.iter_mut().zip(&self.intervals).for_each(|(slot, interval)| *slot = *interval);
+        let mut sorted = self.intervals;
         sorted.sort_unstable();
         const { assert!(SHORT_ONES < INTERVALS) };
-        let interval = sorted[SHORT_ONES];
-        match self.intervals.len() == INTERVALS && interval > self.limit {
-            true => Motor::Slow(1.0 / interval.as_secs_f64()),
-            false => Motor::Regular,
+        match (sorted[0], sorted[SHORT_ONES]) {
+            (Some(_), Some(interval)) if interval > self.limit => {
+                Motor::Slow(1.0 / interval.as_secs_f64())
+            }
+            _ => Motor::Regular,
         }
     }
 
@@ -148,7 +146,7 @@ impl Monitor for Streams {
             found_ns: 0,
             motor_ns: 0,
             newest: None,
-            intervals: VecDeque::new(),
+            intervals: [None; INTERVALS],
             requests: Backoff::new(FIRST_PAUSE, LONGEST_PAUSE),
         }
     }
@@ -170,7 +168,7 @@ impl Monitor for Streams {
             Observation::Found { .. } => {
                 self.found_ns = now.machine_ns;
                 self.newest = None;
-                self.intervals.clear();
+                self.intervals = [None; INTERVALS];
                 self.requests.reset();
                 self.requests.attempted(now.machine_ns);
             }
