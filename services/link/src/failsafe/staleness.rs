@@ -5,23 +5,16 @@ use std::time::Duration;
 use common::{
     clock::{MissionTime, Pace},
     mission::Mission,
-    samples::Cause,
+    samples::{Cause, CommandSample},
 };
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
-
-#[derive(Clone, Copy, Debug)]
-struct Times {
-    command: MissionTime,
-    pose: MissionTime,
-    guidance: MissionTime,
-}
 
 #[derive(Clone, Debug)]
 pub struct Staleness {
     limit: Duration,
     lockstep: bool,
-    newest: Option<Times>,
+    newest: Option<CommandSample>,
 }
 
 impl Monitor for Staleness {
@@ -36,13 +29,7 @@ impl Monitor for Staleness {
     fn observe(&mut self, what: &Observation<'_>, _: Moment) {
         match *what {
             Observation::Pace(pace) => self.lockstep = pace == Pace::Max,
-            Observation::Command(command) => {
-                self.newest = Some(Times {
-                    command: command.stamp.time(),
-                    pose: MissionTime(command.pose_ns),
-                    guidance: MissionTime(command.guidance_ns),
-                });
-            }
+            Observation::Command(command) => self.newest = Some(*command),
             _ => {}
         }
     }
@@ -52,11 +39,12 @@ impl Monitor for Staleness {
             return (cause == Cause::CommandStale).into();
         };
         // In lockstep mission time waits for the command.
-        let now = if self.lockstep { newest.command } else { now.time };
+        let began = newest.stamp.time();
+        let now = if self.lockstep { began } else { now.time };
         let then = match cause {
-            Cause::PoseStale => newest.pose,
-            Cause::GuidanceStale => newest.guidance,
-            _ => newest.command,
+            Cause::PoseStale => MissionTime(newest.pose_ns),
+            Cause::GuidanceStale => MissionTime(newest.guidance_ns),
+            _ => began,
         };
         // Stamps from the future would never expire, so they count as too old.
         (then > now || now.since(then) > self.limit).into()
