@@ -69,7 +69,8 @@ pub enum Counts {
     Implausible,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Ordered by how recently it held.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Condition {
     Holds,
     /// Time since it held; `Duration::MAX` if unmeasured.

@@ -328,13 +328,8 @@ impl Monitor for Range {
         if self.judged(sure).is_some() {
             return Condition::Holds;
         }
-        let over_for = |row: &Row| match row.condition(sure, now) {
-            Condition::Holds => None,
-            Condition::OverFor(over) => Some(over),
-        };
-        let least =
-            self.rows.iter().try_fold(Duration::MAX, |least, row| Some(least.min(over_for(row)?)));
-        least.map_or(Condition::Holds, Condition::OverFor)
+        let conditions = self.rows.iter().map(|row| row.condition(sure, now));
+        conditions.min().unwrap_or(false.into())
     }
 
     fn doubt(&self, doubts: &mut DoubtsSample) {
