@@ -150,9 +150,9 @@ rules! {
         "the robot answers, but has sent no motor frame for three times `robot.command_limit_s`; the link requests them";
     FramesSlow, Stop, streams, WithCondition, Some(|mission| mission.robot.command_limit_s * (streams::INTERVALS - streams::SHORT_ONES) as f64),
         "motor frames come less often than every `robot.command_limit_s`, the lifetime of a command; let the robot send faster, or raise the limit";
-    OdometryImplausible, Stop, odometry, OnResume { or_after: Some(odometry::CALM) }, Some(|mission| mission.trusted_response().dead_time_s() + odometry::STILL_AFTER.as_secs_f64()),
+    OdometryImplausible, Stop, odometry, OnResume { or_after: Some(odometry::CALM) }, Some(|mission| mission.trusted_response().dead_time_s() + odometry::STILL_AFTER_S),
         "one of three signs; `link.log` says which. The encoders show less than a quarter of 0.55 s of commanded motion, due by `robot.response`. They show 1 s of motion that was not commanded, and no other response explains it. The counts make 3 jumps within 2 s. A restart of the robot also ends the first two";
-    WheelsHeld, Stop, odometry, WithCondition, Some(|mission| mission.trusted_response().dead_time_s() + contact::HELD_AFTER.as_secs_f64()),
+    WheelsHeld, Stop, odometry, WithCondition, Some(|mission| mission.trusted_response().dead_time_s() + contact::HELD_AFTER_S),
         "the encoders show less than a quarter of 0.4 s of commanded motion, at a motor current of `robot.held_current_ad` or more. The robot stands for 0.5 s, `contact` gives the place of contact, and the supervisor treats it as a stall";
     Felt, Stop, touch, WithCondition, None,
         "a bumper of `robot.touch` is pressed, or a cliff sensor sees no floor; `link.log` names the row. The robot stands for 0.5 s, or for its stopping time by `robot.response`. Then `contact` gives the place, and the robot goes no nearer while the contact lasts";

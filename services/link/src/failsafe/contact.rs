@@ -12,16 +12,16 @@ use common::{clock::MissionTime, mission::Mission, samples::ContactSample};
 
 use super::monitor::Condition;
 
-/// Duration of high current that shows a held wheel.
-pub(crate) const HELD_AFTER: Duration = Duration::from_millis(400);
+/// Seconds of high current that show a held wheel.
+pub(crate) const HELD_AFTER_S: f64 = 0.4;
 /// Stand-still for mapping the contact and restarting the planner.
 pub(crate) const STANDS_FOR: Duration = Duration::from_millis(500);
 /// Least time between contacts, so that one is answered before the next, in lockstep too.
 const NEXT_AFTER: Duration = Duration::from_secs(1);
 /// Time for a standing wheel's current to fall.
 const FALLEN_AFTER: Duration = Duration::from_millis(350);
-/// Duration of high current on a rolling wheel after which current is no evidence.
-const HIGH_AND_ROLLS: Duration = Duration::from_secs(2);
+/// Seconds of high current on a rolling wheel after which current is no evidence.
+const HIGH_AND_ROLLS_S: f64 = 2.0;
 const MOST_AD: u16 = 4095;
 /// Half the touched arc with both wheels held, radians.
 const HALF_WIDTH: f64 = PI / 4.0;
@@ -33,8 +33,9 @@ const LEAST_AHEAD_SHARE: f64 = 0.5;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Contacts {
     limit_ad: u16,
-    currents: [u16; 2],
-    high_and_rolls_s: [f64; 2],
+    /// Newest currents, AD counts.
+    pub(super) currents: [u16; 2],
+    pub(super) high_and_rolls_s: [f64; 2],
     held: Option<([bool; 2], MissionTime)>,
     pub new: Option<ContactSample>,
 }
@@ -44,20 +45,12 @@ impl Contacts {
         Self { limit_ad: mission.robot.held_current_ad, ..Self::default() }
     }
 
-    pub(super) const fn take_currents(&mut self, currents: [u16; 2]) {
-        self.currents = currents;
-    }
-
     pub(super) fn high(&self) -> [bool; 2] {
-        let range = self.limit_ad.max(1)..=MOST_AD;
-        let is_sign = |s: &f64| self.limit_ad > 0 && *s < HIGH_AND_ROLLS.as_secs_f64();
         [0, 1].map(|wheel| {
-            range.contains(&self.currents[wheel]) && is_sign(&self.high_and_rolls_s[wheel])
+            self.limit_ad > 0
+                && (self.limit_ad..=MOST_AD).contains(&self.currents[wheel])
+                && self.high_and_rolls_s[wheel] < HIGH_AND_ROLLS_S
         })
-    }
-
-    pub(super) fn rolled(&mut self, wheel: usize, gap_s: f64) {
-        self.high_and_rolls_s[wheel] += gap_s;
     }
 
     /// Registers held wheels with commanded speeds, counts/s. Returns whether the contact is new.

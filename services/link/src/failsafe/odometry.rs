@@ -7,15 +7,15 @@
 //!
 //! Each wheel and their difference are checked, because swapped wheels turn the robot the wrong
 //! way. Evidence against one adds up; evidence for it counts down at most twice as fast. Opposite
-//! motion counts twice, once a wheel could have reversed. At [`SUSPECTED_AFTER`] the robot must
+//! motion counts twice, once a wheel could have reversed. At [`SUSPECTED_AFTER_S`] the robot must
 //! stand. Until it does, [`super::response_fit`] looks for a response that explains the motion.
 //!
-//! A commanded wheel without counts is suspected after [`STILL_AFTER`], because a controller whose
+//! A commanded wheel without counts is suspected after [`STILL_AFTER_S`], because a controller whose
 //! pose turns the wrong way changes direction too often for the other evidence. With a held motor's
 //! current the wheel counts as held instead ([`super::contact`]).
 //!
 //! Motion is uncommanded if a wheel or the difference exceeds every recent command by
-//! [`LEAST_TURN_M_S`] plus a quarter of the wheels' speed, for [`UNTOLD_AFTER`].
+//! [`LEAST_TURN_M_S`] plus a quarter of the wheels' speed, for [`UNTOLD_AFTER_S`].
 //!
 //! Single impossible counts are dropped ([`super::restart`]); [`MOST_JUMPS`] within
 //! [`JUMPS_WITHIN`] are suspect too.
@@ -31,10 +31,10 @@ use common::{
 
 use super::{
     base_response::is_longer,
-    contact::{Contacts, HELD_AFTER},
+    contact::{Contacts, HELD_AFTER_S},
     modelled_wheels::{Axle, ModelledWheels},
     monitor::{Condition, Counts, Moment, Monitor, Observation},
-    response_fit::{ResponseFit, Suspected},
+    response_fit::{ResponseFit, Suspected, channels},
     wheel_shares::WheelShares,
 };
 
@@ -45,12 +45,13 @@ const LEAST_TURN_M_S: f64 = 0.1;
 const LEAST_TURN_SHARE: f64 = 0.25;
 const LEAST_SHARE: f64 = 0.25;
 const ROLLS_SHARE: f64 = 0.5;
-/// Evidence that raises a suspicion. A radio that delivers frames loses commands for less time.
-pub(crate) const SUSPECTED_AFTER: Duration = Duration::from_millis(550);
-/// Time without counts that raises a suspicion.
-pub(crate) const STILL_AFTER: Duration = Duration::from_millis(1000);
-/// Time of uncommanded motion that raises a suspicion.
-pub(crate) const UNTOLD_AFTER: Duration = Duration::from_millis(1000);
+/// Seconds of evidence that raise a suspicion. A radio that delivers frames loses commands for less
+/// time.
+pub(crate) const SUSPECTED_AFTER_S: f64 = 0.55;
+/// Seconds without counts that raise a suspicion.
+pub(crate) const STILL_AFTER_S: f64 = 1.0;
+/// Seconds of uncommanded motion that raise a suspicion.
+const UNTOLD_AFTER_S: f64 = 1.0;
 /// Time before a suspicion that holds its evidence, and after it within which a base stops.
 const JUDGED: Duration = Duration::from_millis(1500);
 pub(crate) const MOST_JUMPS: usize = 3;
@@ -96,19 +97,11 @@ impl Suspicion {
     }
 }
 
-/// Times at which counts become evidence about a command, by the base's response, seconds.
-#[derive(Clone, Copy)]
-struct Settles {
-    settled_s: f64,
-    /// Time until a wheel has reversed; an X80's at 7 Hz has 0.6 of its speed.
-    turned_s: f64,
-}
-
-impl From<Response> for Settles {
-    fn from(Response { delay_s, lag_s, .. }: Response) -> Self {
-        assert!(delay_s >= 0.0 && lag_s >= 0.0);
-        Self { settled_s: delay_s + 2.0 * lag_s + 0.02, turned_s: delay_s + 0.375 * lag_s }
-    }
+/// Returns when counts become evidence about a command, seconds: once the wheel has settled, and
+/// once it has reversed; an X80's at 7 Hz then has 0.6 of its speed.
+fn settles(Response { delay_s, lag_s, .. }: Response) -> [f64; 2] {
+    assert!(delay_s >= 0.0 && lag_s >= 0.0);
+    [delay_s + 2.0 * lag_s + 0.02, delay_s + 0.375 * lag_s]
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -145,7 +138,7 @@ impl Evidence {
         (counts, gap_s): (f64, f64),
         least: f64,
         high: bool,
-        settles: Settles,
+        [settled_s, turned_s]: [f64; 2],
         now: MissionTime,
     ) -> bool {
         let [before, newest] = self.asked;
@@ -159,7 +152,7 @@ impl Evidence {
             // The motor pushes in vain. A body that pivots on the contact may even push its wheel
             // back.
             self.still_s = 0.0;
-            if told_s >= settles.settled_s {
+            if told_s >= settled_s {
                 self.held_s += gap_s;
             }
             return false;
@@ -167,7 +160,7 @@ impl Evidence {
         self.held_s = 0.0;
         self.still_s = if counts.abs() <= 1.0 { self.still_s + gap_s } else { 0.0 };
         let opposite = share <= -LEAST_SHARE;
-        if told_s < if opposite { settles.turned_s } else { settles.settled_s } {
+        if told_s < if opposite { turned_s } else { settled_s } {
             return false;
         }
         let most = if opposite { 2.0 } else { 1.0 };
@@ -224,21 +217,17 @@ impl Odometry {
             self.restart_evidence(now);
         }
         self.commanded = Some(now);
-        let [told_left, told_right] = counts.map(f64::from);
-        let [left, right] = self.ask([told_left, told_right], now);
-        let told = [told_left, told_right, told_right - told_left];
+        let told = counts.map(f64::from);
+        let (reached, told) = (channels(self.ask(told, now)), channels(told));
         // A base may stop sooner than its response states.
-        let [left, right, turn] =
-            [(0, left), (1, right), (2, right - left)].map(|(of, reached)| {
-                let most = told[of].abs();
-                if reached * told[of] > 0.0 { reached.clamp(-most, most) } else { 0.0 }
-            });
+        let [left, right, turn] = [0, 1, 2].map(|of| {
+            let most = told[of].abs();
+            if reached[of] * told[of] > 0.0 { reached[of].clamp(-most, most) } else { 0.0 }
+        });
         let mean = (left.abs() + right.abs()) / 2.0;
         let tells = turn.abs() >= LEAST_TURN_SHARE * mean;
         let asked = [left, right, if tells { turn } else { 0.0 }];
-        // Only one wheel of a car drives.
-        let judged = self.axle.track_m.map_or(1, |_| asked.len());
-        for (evidence, asked) in self.evidence.iter_mut().zip(asked).take(judged) {
+        for (evidence, asked) in self.evidence.iter_mut().zip(asked).take(self.fit.judged()) {
             evidence.ask(asked, now);
         }
     }
@@ -294,20 +283,20 @@ impl Odometry {
             return;
         }
         let [left, right] = turned;
-        let settles = Settles::from(self.response);
+        let settles @ [settled_s, _] = settles(self.response);
         let gap_s = gap.as_secs_f64();
         let least = LEAST_M_S * self.axle.counts_per_m;
         let high = self.contacts.high();
         for (wheel, evidence) in self.evidence[..2].iter_mut().enumerate() {
             let rolled = (turned[wheel], gap_s);
             if evidence.weigh(rolled, least, high[wheel], settles, now) && high[wheel] {
-                self.contacts.rolled(wheel, gap_s);
+                self.contacts.high_and_rolls_s[wheel] += gap_s;
             }
         }
         if high == [false; 2] {
             let least = LEAST_TURN_M_S * self.axle.counts_per_m;
             self.evidence[2].weigh((right - left, gap_s), least, false, settles, now);
-            let from_s = now.seconds() - gap_s - settles.settled_s - self.limit.as_secs_f64();
+            let from_s = now.seconds() - gap_s - settled_s - self.limit.as_secs_f64();
             let speeds = turned.map(|counts| counts / gap_s);
             let slows = (from_s, self.axle.limits(&self.response));
             let is_untold = self.fit.is_untold(speeds, slows, least);
@@ -316,12 +305,11 @@ impl Odometry {
         }
         self.look_for_contact(now);
         let suspected = |(evidence, _): &(&Evidence, Suspicion)| {
-            evidence.against_s >= SUSPECTED_AFTER.as_secs_f64()
-                || evidence.still_s >= STILL_AFTER.as_secs_f64()
+            evidence.against_s >= SUSPECTED_AFTER_S || evidence.still_s >= STILL_AFTER_S
         };
         let all = [Suspicion::Left, Suspicion::Right, Suspicion::Turn];
         let suspicion = self.evidence.iter().zip(all).find(suspected);
-        let untold = (self.untold_s >= UNTOLD_AFTER.as_secs_f64()).then_some(Suspicion::Untold);
+        let untold = (self.untold_s >= UNTOLD_AFTER_S).then_some(Suspicion::Untold);
         if let Some(suspicion) = suspicion.map(|(_, suspicion)| suspicion).or(untold)
             && self.judges
         {
@@ -400,7 +388,7 @@ impl Odometry {
 
     fn look_for_contact(&mut self, now: MissionTime) {
         let [left, right, _] = self.evidence.map(|evidence| evidence.held_s);
-        if left.max(right) < HELD_AFTER.as_secs_f64() {
+        if left.max(right) < HELD_AFTER_S {
             return;
         }
         let held = if self.axle.track_m.is_none() { [true; 2] } else { [left > 0.0, right > 0.0] };
@@ -488,7 +476,7 @@ impl Monitor for Odometry {
                 self.two_publishers = Some((words.to_owned(), now.time));
             }
             Observation::Commanded(counts) => self.commanded(counts, now.time),
-            Observation::Currents(currents) => self.contacts.take_currents(currents),
+            Observation::Currents(currents) => self.contacts.currents = currents,
             Observation::Motor(counts, Counts::Follow) => self.plausible(counts, now.time),
             Observation::Motor(_, Counts::Restarted { was_away: true }) => self.reset(),
             Observation::Motor(_, Counts::Implausible) => self.implausible(now.time),
@@ -516,13 +504,10 @@ impl Monitor for Odometry {
     }
 
     fn doubt(&self, doubts: &mut DoubtsSample) {
-        let seconds = |seconds: f64, of: Duration| seconds / of.as_secs_f64();
-        let [left, right, turn] = self
+        [doubts.left_wheel, doubts.right_wheel, doubts.turn] = self
             .evidence
-            .each_ref()
-            .map(|it| seconds(it.against_s, SUSPECTED_AFTER).max(seconds(it.still_s, STILL_AFTER)));
-        (doubts.left_wheel, doubts.right_wheel, doubts.turn) = (left, right, turn);
-        doubts.uncommanded = seconds(self.untold_s, UNTOLD_AFTER);
+            .map(|it| (it.against_s / SUSPECTED_AFTER_S).max(it.still_s / STILL_AFTER_S));
+        doubts.uncommanded = self.untold_s / UNTOLD_AFTER_S;
         doubts.jumps = self.jumps.len() as f64 / MOST_JUMPS as f64;
     }
 

@@ -85,7 +85,7 @@ fn is_far_better(unlike: f64, other: f64) -> bool {
     other > (unlike + LEAST_BETTER).max(BETTER * (unlike + NOISE))
 }
 
-fn channels([left, right]: [f64; 2]) -> [f64; CHANNELS] {
+pub(super) fn channels([left, right]: [f64; 2]) -> [f64; CHANNELS] {
     [left, right, right - left]
 }
 
@@ -147,7 +147,8 @@ impl ResponseFit {
             && channels(limits.axes(speeds)).into_iter().enumerate().take(judged).any(is_beyond)
     }
 
-    fn judged(&self) -> usize {
+    /// Returns the number of judged channels. Only one wheel of a car drives.
+    pub(super) fn judged(&self) -> usize {
         self.axle.track_m.map_or(1, |_| CHANNELS)
     }
 

@@ -297,20 +297,20 @@ fn an_operators_resume_clears_at_once_what_its_row_says_and_an_end_stays() {
 
 #[test]
 fn the_words_of_the_table_say_the_numbers_that_hold() {
-    use odometry::{GIVEN_UP_AFTER, JUMPS_WITHIN, MOST_JUMPS, SUSPECTED_AFTER};
+    use odometry::{GIVEN_UP_AFTER, JUMPS_WITHIN, MOST_JUMPS, SUSPECTED_AFTER_S};
     let seconds = |span: Duration| format!("{} s", span.as_secs_f64());
     for (cause, words) in [
         (Cause::BatteryLow, format!("{} V", battery::RECOVERED_V)),
         (Cause::SupervisorSilent, seconds(orders::SUPERVISOR_SILENT)),
         (Cause::BatteryEmpty, seconds(battery::EMPTY_AFTER)),
         (Cause::OdometryGivenUp, seconds(GIVEN_UP_AFTER)),
-        (Cause::OdometryImplausible, seconds(SUSPECTED_AFTER)),
+        (Cause::OdometryImplausible, format!("{SUSPECTED_AFTER_S} s")),
         (
             Cause::OdometryImplausible,
             format!("{MOST_JUMPS} jumps within {}", seconds(JUMPS_WITHIN)),
         ),
         (Cause::RobotDoesNotStop, seconds(stop_monitor::DOES_NOT_STOP_AFTER)),
-        (Cause::WheelsHeld, seconds(contact::HELD_AFTER)),
+        (Cause::WheelsHeld, format!("{} s", contact::HELD_AFTER_S)),
         (Cause::WheelsHeld, format!("stands for {}", seconds(contact::STANDS_FOR))),
         (Cause::RobotLost, "three times".to_owned()),
     ] {

@@ -241,7 +241,7 @@ fn held(
     let (mut contacts, mut stood, mut rolled) = (Vec::new(), 1, [0.0; 2]);
     for tick in 0..40 {
         let time = f64::from(tick) * PERIOD_S;
-        odometry.contacts.take_currents(held.map(|held| current(held, stood)));
+        odometry.contacts.currents = held.map(|held| current(held, stood));
         odometry.plausible(rolled.map(on_wire), at(time));
         contacts.extend(odometry.contacts.new.take().map(|contact| (time, contact)));
         if let Some(suspicion) = suspicion(&odometry) {
@@ -280,7 +280,7 @@ fn a_current_that_repeats_is_beyond_the_range_low_or_high_on_rolling_wheels_is_n
     }
     let mut robot = (odometry(), Wheels::default());
     let suspected = (0..60).find_map(|tick| {
-        robot.0.contacts.take_currents([HELD_AD; 2]);
+        robot.0.contacts.currents = [HELD_AD; 2];
         // The encoders die after 5 s.
         let says = |counts: [u16; 2]| if tick <= 35 { counts } else { [0; 2] };
         let time = f64::from(tick) * PERIOD_S;
