@@ -32,7 +32,7 @@ pub mod streams;
 pub mod touch;
 pub(crate) mod wheel_shares;
 
-use std::time::Duration;
+use std::{collections::VecDeque, time::Duration};
 
 use common::{
     mission::Mission,
@@ -203,6 +203,15 @@ impl Decision {
         }
         assert_eq!(worst.action == Action::Go, worst.cause == Cause::None);
         worst
+    }
+}
+
+/// Keeps at most so many values of the last `for_s` seconds, oldest first.
+fn keep<T>(kept: &mut VecDeque<(f64, T)>, new: (f64, T), for_s: f64, most: usize) {
+    let now = new.0;
+    kept.push_back(new);
+    while kept.len() > most || kept.front().is_some_and(|(at, _)| now - at > for_s) {
+        kept.pop_front();
     }
 }
 

@@ -10,6 +10,8 @@ use std::collections::VecDeque;
 use common::{clock::MissionTime, kinematics::Pose2};
 use glam::DVec2;
 
+use super::keep;
+
 /// Bound on kept poses.
 const MOST_KEPT: usize = 2048;
 
@@ -37,7 +39,7 @@ impl Hypothesis {
                 let counted = ago(0.0);
                 [counted[0], rolled(counted[0], counted, share)]
             }
-            Self::Scaled(_) | Self::Longer(_) => ago(0.0),
+            _ => ago(0.0),
         }
     }
 
@@ -97,10 +99,7 @@ pub(super) struct Poses(VecDeque<(f64, Pose2)>);
 
 impl Poses {
     pub(super) fn robot_is(&mut self, pose: Pose2, now: MissionTime) {
-        self.0.push_back((now.seconds(), pose));
-        if self.0.len() > MOST_KEPT {
-            self.0.pop_front();
-        }
+        keep(&mut self.0, (now.seconds(), pose), f64::INFINITY, MOST_KEPT);
     }
 
     pub(super) fn is_empty(&self) -> bool {

@@ -7,7 +7,10 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use super::motion_bank::{Hypothesis, Poses, motion_m};
+use super::{
+    keep,
+    motion_bank::{Hypothesis, Poses, motion_m},
+};
 
 /// Least change from one reading to the next that shows motion, and tolerance of a repeated one,
 /// metres.
@@ -30,7 +33,7 @@ const LIMITS: [f64; 2] = [8.0, 14.0];
 #[derive(Clone, Debug, Default)]
 pub(super) struct Repeats {
     /// Times and ranges, seconds and metres, by sensor.
-    past: BTreeMap<u8, VecDeque<[f64; 2]>>,
+    past: BTreeMap<u8, VecDeque<(f64, f64)>>,
     sums: [f64; LAGS],
 }
 
@@ -43,47 +46,40 @@ impl Repeats {
         at_s: f64,
     ) {
         let now = poses.at(at_s);
-        let has_moved = std::array::from_fn(|lag| {
+        let has_moved: [bool; LAGS] = std::array::from_fn(|lag| {
             let then = poses.at(at_s - lag as f64 * STEP_S);
             motion_m([then, now], M_PER_RAD) > MOVED_M
         });
         for (sensor, range_m) in readings {
-            self.take_one(sensor, range_m, at_s, has_moved);
-        }
-    }
-
-    fn take_one(&mut self, sensor: u8, range_m: f64, at_s: f64, has_moved: [bool; LAGS]) {
-        let past = self.past.entry(sensor).or_default();
-        // Frames that come at once waited somewhere. Their times are unknown, and the last is now's.
-        if let Some([then_s, before_m]) = past.back_mut()
-            && (0.0..STEP_S / 2.0).contains(&(at_s - *then_s))
-        {
-            *before_m = range_m;
-            return;
-        }
-        if past.back().is_some_and(|[_, before_m]| (range_m - before_m).abs() > CHANGES_M) {
-            let mut repeats = [false; LAGS];
-            let same = past.iter().filter(|[_, then_m]| (range_m - then_m).abs() < SAME_M);
-            let lags = same.map(|[then_s, _]| at_s - then_s).filter(|lag_s| *lag_s >= LEAST_S);
-            for lag in lags.map(|lag_s| (lag_s / STEP_S) as usize) {
-                repeats.iter_mut().skip(lag).take(2).for_each(|it| *it = true);
+            let past = self.past.entry(sensor).or_default();
+            // Frames that come at once waited somewhere. Their times are unknown, and the last is
+            // now's.
+            if let Some((then_s, before_m)) = past.back_mut()
+                && (0.0..STEP_S / 2.0).contains(&(at_s - *then_s))
+            {
+                *before_m = range_m;
+                continue;
             }
-            // Chance to repeat with any lag.
-            let count = repeats.iter().filter(|it| **it).count();
-            let chance = (count as f64 / LAGS as f64).min(REPEATED);
-            let sums = self.sums.iter_mut().zip(repeats).zip(has_moved);
-            for ((sum, repeats), _) in sums.filter(|(_, has_moved)| *has_moved) {
-                let ratio = match repeats {
-                    true => REPEATED / chance,
-                    false => (1.0 - REPEATED) / (1.0 - chance),
-                };
-                *sum = (*sum + ratio.ln()).clamp(0.0, 2.0 * LIMITS[1]);
+            if past.back().is_some_and(|(_, before_m)| (range_m - before_m).abs() > CHANGES_M) {
+                let mut repeats = [false; LAGS];
+                let same = past.iter().filter(|(_, then_m)| (range_m - then_m).abs() < SAME_M);
+                let lags = same.map(|(then_s, _)| at_s - then_s).filter(|lag_s| *lag_s >= LEAST_S);
+                for lag in lags.map(|lag_s| (lag_s / STEP_S) as usize) {
+                    repeats.iter_mut().skip(lag).take(2).for_each(|it| *it = true);
+                }
+                // Chance to repeat with any lag.
+                let count = repeats.iter().filter(|it| **it).count();
+                let chance = (count as f64 / LAGS as f64).min(REPEATED);
+                let sums = self.sums.iter_mut().zip(repeats).zip(has_moved);
+                for ((sum, repeats), _) in sums.filter(|(_, has_moved)| *has_moved) {
+                    let ratio = match repeats {
+                        true => REPEATED / chance,
+                        false => (1.0 - REPEATED) / (1.0 - chance),
+                    };
+                    *sum = (*sum + ratio.ln()).clamp(0.0, 2.0 * LIMITS[1]);
+                }
             }
-        }
-        past.push_back([at_s, range_m]);
-        let is_old = |[then_s, _]: &[f64; 2]| at_s - then_s > LAGS as f64 * STEP_S;
-        while past.len() > MOST_KEPT || past.front().is_some_and(is_old) {
-            past.pop_front();
+            keep(past, (at_s, range_m), LAGS as f64 * STEP_S, MOST_KEPT);
         }
     }
 

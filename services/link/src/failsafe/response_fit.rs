@@ -9,7 +9,10 @@ use std::collections::VecDeque;
 
 use common::{clock::MissionTime, mission::Response};
 
-use super::modelled_wheels::{Axle, Limits};
+use super::{
+    keep,
+    modelled_wheels::{Axle, Limits},
+};
 
 const KEPT_S: f64 = 5.0;
 /// Extra retention of commands, because the wheels may roll when the oldest counts are taken.
@@ -104,7 +107,7 @@ impl ResponseFit {
     }
 
     pub(super) fn commanded(&mut self, counts: [f64; 2], now: MissionTime) {
-        keep(&mut self.commands, (now.seconds(), counts), KEPT_S + BEFORE_S);
+        keep(&mut self.commands, (now.seconds(), counts), KEPT_S + BEFORE_S, MOST_KEPT);
     }
 
     pub(super) fn turned(&mut self, counts: Option<[f64; 2]>, now: MissionTime) {
@@ -116,7 +119,7 @@ impl ResponseFit {
             *before = [before[0] + left, before[1] + right];
             return;
         }
-        keep(&mut self.turned, (now.seconds(), counts), KEPT_S);
+        keep(&mut self.turned, (now.seconds(), counts), KEPT_S, MOST_KEPT);
     }
 
     /// Returns whether wheels or limited axes exceed every command.
@@ -448,14 +451,6 @@ impl Motion {
 
     fn is_as_modelled(&self, factor: f64) -> bool {
         self.unlike(factor) <= UNEXPLAINED * self.model.max(self.turned) + self.rounding
-    }
-}
-
-fn keep<T>(kept: &mut VecDeque<(f64, T)>, new: (f64, T), for_s: f64) {
-    let now = new.0;
-    kept.push_back(new);
-    while kept.len() > MOST_KEPT || kept.front().is_some_and(|(at, _)| now - at > for_s) {
-        kept.pop_front();
     }
 }
 
