@@ -79,8 +79,7 @@ struct Hit {
 pub(super) struct RangeMotion {
     sensors: BTreeMap<u8, Sensor>,
     hits: VecDeque<(f64, Hit)>,
-    /// Robot now by the wheels, and under each hypothesis.
-    robot: Pose2,
+    /// Robot now under each hypothesis; the first is by the wheels.
     robots: [Pose2; ALL.len()],
     /// Robot at the newest hits, under each hypothesis.
     latest: [Pose2; ALL.len()],
@@ -103,7 +102,6 @@ impl RangeMotion {
         Self {
             sensors,
             hits: VecDeque::new(),
-            robot: Pose2::default(),
             robots: [Pose2::default(); ALL.len()],
             latest: [Pose2::default(); ALL.len()],
             newest_s: 0.0,
@@ -121,13 +119,10 @@ impl RangeMotion {
         if self.judged(true).is_some() {
             return;
         }
-        let is_judged = |it: &&RangeReading| {
-            it.status() == RangeStatus::Measured && self.sensors.contains_key(&it.sensor)
-        };
-        let judged = readings.iter().filter(is_judged).map(|it| (it.sensor, it.range_m));
-        self.repeats.take(judged, poses, at_s);
-        let counted = [self.robot, poses.at(at_s)];
-        self.robot = counted[1];
+        let measured = || readings.iter().filter(|it| it.status() == RangeStatus::Measured);
+        let judged = measured().filter(|it| self.sensors.contains_key(&it.sensor));
+        self.repeats.take(judged.map(|it| (it.sensor, it.range_m)), poses, at_s);
+        let counted = [self.robots[0], poses.at(at_s)];
         for (robot, (hypothesis, _)) in self.robots.iter_mut().zip(ALL) {
             *robot = match hypothesis {
                 Late(by_s) => poses.at(at_s - by_s),
@@ -154,7 +149,7 @@ impl RangeMotion {
         }
         debug_assert!(self.hits.iter().is_sorted_by(|one, next| one.0 <= next.0));
         let older = self.hits.partition_point(|(then_s, _)| now_s - then_s >= LEAST_AGE_S);
-        for reading in readings.iter().filter(|it| it.status() == RangeStatus::Measured) {
+        for reading in measured() {
             let Some(sensor) = self.sensors.get(&reading.sensor) else { continue };
             let range_m = reading.range_m;
             if range_m > KNOWN * sensor.reach_m {
