@@ -101,6 +101,28 @@ fn curve([left, right]: [f64; 2]) -> f64 {
     (right / left).abs().ln()
 }
 
+/// Returns whether pending commands of `wheels` continue the curve's recent change.
+///
+/// Wheels answer a corner partly before the model. The ticks that would compensate are unsteady and
+/// left out, so the tick before must be too.
+fn goes_on(
+    wheels: &ModelledWheels,
+    told: [f64; 2],
+    change: f64,
+    [then_s, now_s]: [f64; 2],
+) -> bool {
+    let mut before = [f64::NAN; 2];
+    wheels.pending().all(|(acts_s, speeds)| {
+        // The link repeats its commands.
+        if std::mem::replace(&mut before, speeds) == speeds {
+            return true;
+        }
+        let ticks = 1.0 + (acts_s - now_s) / (now_s - then_s);
+        let same_ways = speeds[0] * told[0] > 0.0 && speeds[1] * told[1] > 0.0;
+        same_ways && (curve(speeds) - curve(told) - change * ticks).abs() <= MOST_CORNER
+    })
+}
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct WheelRatio {
     pub ratio: f64,
@@ -202,44 +224,22 @@ impl WheelShares {
         if let Some((before, then_s)) = before
             && now_s - then_s <= self.longest_gap_s
         {
-            let rolled = counts.since(before);
             let metres = |counts: [f64; 2]| counts.map(|count| count / self.axle.counts_per_m);
-            self.untold.take([metres(told), metres(rolled)]);
+            let (told, rolled) = (metres(told), metres(counts.since(before)));
+            self.untold.take([told, rolled]);
             // Travel during speed changes depends on timing, which the model knows less well.
             let (left, speeds) =
                 (wheels.each(ModelledSpeed::left), wheels.each(ModelledSpeed::speed));
             let settles = |wheel: usize| left[wheel].abs() <= SETTLED * speeds[wheel].abs();
             let told = if settles(0) && settles(1) { told } else { [0.0; 2] };
-            let now = [metres(told), metres(rolled)];
             self.newest.rotate_left(1);
-            self.newest[STEADY - 1] = now;
-            let change = (curve(now[0]) - curve(self.newest[0][0])) / (STEADY - 1) as f64;
-            if self.is_steady(LEAST_SPEED * self.top_speed_m_s * (now_s - then_s))
-                && self.goes_on(now[0], change, [then_s, now_s])
-            {
-                self.sums.add(now[0], now[1], change);
+            self.newest[STEADY - 1] = [told, rolled];
+            let change = (curve(told) - curve(self.newest[0][0])) / (STEADY - 1) as f64;
+            let goes_on = goes_on(wheels, told, change, [then_s, now_s]);
+            if goes_on && self.is_steady(LEAST_SPEED * self.top_speed_m_s * (now_s - then_s)) {
+                self.sums.add(told, rolled, change);
             }
         }
-    }
-
-    /// Returns whether pending commands continue the curve's recent change.
-    ///
-    /// Wheels answer a corner partly before the model. The ticks that would compensate are unsteady
-    /// and left out, so the tick before must be too.
-    fn goes_on(&self, told: [f64; 2], change: f64, [then_s, now_s]: [f64; 2]) -> bool {
-        let Some(wheels) = &self.wheels else {
-            return false;
-        };
-        let mut before = [f64::NAN; 2];
-        wheels.pending().all(|(acts_s, speeds)| {
-            // The link repeats its commands.
-            if std::mem::replace(&mut before, speeds) == speeds {
-                return true;
-            }
-            let ticks = 1.0 + (acts_s - now_s) / (now_s - then_s);
-            let same_ways = speeds[0] * told[0] > 0.0 && speeds[1] * told[1] > 0.0;
-            same_ways && (curve(speeds) - curve(told) - change * ticks).abs() <= MOST_CORNER
-        })
     }
 
     fn is_steady(&self, least_m: f64) -> bool {
