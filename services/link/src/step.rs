@@ -230,8 +230,7 @@ impl Link {
             _ => None,
         });
         if let Some(owed) = sent.reduce(|one, other| one + other) {
-            self.observe(Observation::Sent);
-            self.observe(Observation::Owed(owed));
+            self.observe(Observation::Sent(owed));
         }
         std::mem::take(&mut self.effects)
     }
@@ -363,10 +362,9 @@ impl Link {
             trim.rolled(WheelCounts::of(&wheels, endless.as_ref()), self.now.seconds());
         }
         let (ranges, scans) = self.sensors.for_tick(&motion, self.now);
-        let turn = self.base.turn_for_tick().map(|turn| {
-            let Turn { sequence, turn_rad, variance_rad2 } = turn;
-            // The turn ends with the tick's motion.
-            let capture_ns = self.now.0;
+        // The turn ends with the tick's motion.
+        let capture_ns = self.now.0;
+        let turn = self.base.turn_for_tick().map(|Turn { sequence, turn_rad, variance_rad2 }| {
             TurnSample { capture_ns, sequence, turn_rad, variance_rad2, ..TurnSample::default() }
         });
         let contact = self.failsafe.odometry.contacts.new.take();
@@ -392,8 +390,7 @@ impl Link {
     }
 
     fn take_command(&mut self, command: &CommandSample) {
-        let newer = |held: &CommandSample| held.stamp.tick <= command.stamp.tick;
-        if !self.newest_command.as_ref().is_none_or(newer) {
+        if self.newest_command.is_some_and(|held| held.stamp.tick > command.stamp.tick) {
             return;
         }
         let answers = self.open.is_some() && command.stamp.tick == self.open_number();

@@ -146,7 +146,7 @@ impl Monitor for OtherCommander {
             Observation::Time => return self.pass(now_ns),
             Observation::Motor(..) => return self.window.frames += 1,
             Observation::Acknowledged => return self.acknowledged(now_ns),
-            Observation::Owed(count) => return self.owed.extend(repeat_n(now_ns, count)),
+            Observation::Sent(owed) => return self.owed.extend(repeat_n(now_ns, owed)),
             Observation::Found { .. } => {
                 self.shared = 0;
                 return self.owed.extend(repeat_n(now_ns, OWED_WHEN_FOUND));

@@ -9,11 +9,12 @@ use std::time::Duration;
 
 use common::{clock::Pace, mission::Mission, samples::Cause};
 
-use super::monitor::{Condition, Moment, Monitor, Observation};
+use super::{
+    monitor::{Condition, Moment, Monitor, Observation},
+    presence::LEAST_SILENCE,
+};
 use crate::backoff::has_passed;
 
-/// Least limit, machine time: a process may be delayed by this at any pace.
-const LEAST_LIMIT: Duration = Duration::from_millis(100);
 /// Window beyond the limit, mission time. A standing robot gets commands every 0.2 s.
 const WINDOW: Duration = Duration::from_millis(400);
 /// Retest interval of a late robot, mission time.
@@ -46,9 +47,9 @@ impl LatencyMonitor {
             _ => 1.0,
         };
         let machine = |mission: Duration| mission.div_f64(rate);
-        self.limit = machine(self.command_limit).max(LEAST_LIMIT);
+        self.limit = machine(self.command_limit).max(LEAST_SILENCE);
         self.window = self.limit + machine(WINDOW);
-        assert!(self.window >= self.limit && self.limit >= LEAST_LIMIT);
+        assert!(self.window >= self.limit && self.limit >= LEAST_SILENCE);
         self.again = machine(AGAIN);
     }
 
@@ -86,7 +87,7 @@ impl Monitor for LatencyMonitor {
         match *what {
             Observation::Pace(pace) => self.set_pace(pace),
             Observation::Time => self.pass(now.machine_ns),
-            Observation::Sent => self.sent_ns = now.machine_ns,
+            Observation::Sent(_) => self.sent_ns = now.machine_ns,
             Observation::Acknowledged => {
                 let age_ns = now.machine_ns.saturating_sub(self.sent_ns);
                 self.came_late |= Duration::from_nanos(age_ns) > self.limit;
@@ -127,7 +128,7 @@ mod tests {
                 monitor.observe(&what, Moment { machine_ns, ..Moment::default() });
             };
             take(Observation::Pace(Pace::Rate(0.5)), 0);
-            take(Observation::Sent, 0);
+            take(Observation::Sent(0), 0);
             take(Observation::Found { again: true }, 0);
             for now in (0..=quiet_ms).step_by(70) {
                 if now <= delay_ms {

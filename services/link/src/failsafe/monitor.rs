@@ -27,9 +27,8 @@ pub enum Observation<'a> {
     Command(&'a CommandSample),
     /// Speeds sent to the wheels, counts/s, forward positive.
     Commanded([i16; 2]),
-    Sent,
-    /// Further acknowledgements owed.
-    Owed(usize),
+    /// Messages sent, and the further acknowledgements owed.
+    Sent(usize),
     Acknowledged,
     /// Motor currents for the next motor frame, AD counts.
     Currents([u16; 2]),
@@ -137,12 +136,9 @@ pub trait Monitor {
     fn condition(&self, cause: Cause, now: Moment) -> Condition;
 
     /// Adds its evidence.
-    fn doubt(&self, doubts: &mut DoubtsSample) {
-        let _ = doubts;
-    }
+    fn doubt(&self, _doubts: &mut DoubtsSample) {}
 
-    fn explain(&self, cause: Cause, now: Moment) -> Option<String> {
-        let _ = (cause, now);
+    fn explain(&self, _cause: Cause, _now: Moment) -> Option<String> {
         None
     }
 

@@ -7,8 +7,8 @@ use common::{clock::Pace, mission::Mission, samples::Cause};
 use super::monitor::{Condition, Moment, Monitor, Observation};
 use crate::backoff::{Backoff, has_passed};
 
-/// Least silence, machine time: a process may be delayed by this at any pace.
-const LEAST_SILENCE: Duration = Duration::from_millis(100);
+/// Least silence and least delay, machine time: a process may be delayed by this at any pace.
+pub(super) const LEAST_SILENCE: Duration = Duration::from_millis(100);
 const FIRST_PAUSE: Duration = Duration::from_millis(200);
 /// Longest time to find a robot that waits for a ping; one that sends unasked is found at once.
 const LONGEST_PAUSE: Duration = Duration::from_secs(2);

@@ -381,7 +381,7 @@ fn acknowledgements_of_what_was_not_sent_show_another_commander_and_late_or_doub
     let after = |failsafe: &mut Failsafe, windows: std::ops::Range<u64>, count: usize| {
         let monitor = &mut failsafe.commander;
         for when in windows.map(|window| ago((20 - 2 * window) * 1000 * MS)) {
-            monitor.observe(&Owed(50), when);
+            monitor.observe(&Sent(50), when);
             (0..count).for_each(|_| monitor.observe(&Acknowledged, when));
             monitor.observe(&Time, when);
         }
@@ -421,7 +421,7 @@ fn frames_that_go_elsewhere_while_acknowledgements_come_at_once_show_another_com
             if tick % every == 0 {
                 take(counts(0), ms_ago);
             }
-            take(Owed(1), ms_ago);
+            take(Sent(1), ms_ago);
             if tick % answered == 0 {
                 take(Acknowledged, ms_ago - late_ms);
             }
