@@ -63,10 +63,6 @@ impl Missing {
         self.spells += u32::from(!was_sure && self.sum >= sure);
     }
 
-    fn end(&mut self) {
-        self.sum = 0.0;
-    }
-
     fn is(self, least: f64) -> bool {
         self.sum >= least || self.is_in_motion()
     }
@@ -160,8 +156,8 @@ impl Hearing {
             let missing = memory.one.entry(reading.sensor).or_default();
             match status {
                 RangeStatus::Measured => {
-                    missing.end();
-                    memory.all.end();
+                    missing.sum = 0.0;
+                    memory.all.sum = 0.0;
                     memory.echoes.hear(listener, reading.range_m, at_s);
                 }
                 RangeStatus::Nothing => {
@@ -215,7 +211,7 @@ impl Hearing {
         if frame.hears {
             memory.mean_ends += (frame.ends - memory.mean_ends) / MEAN_OF;
             assert!(memory.mean_ends >= 0.0);
-            memory.ends.end();
+            memory.ends.sum = 0.0;
             (memory.frames, memory.way_m) = (0, 0.0);
         } else if frame.answers {
             memory.frames += 1;

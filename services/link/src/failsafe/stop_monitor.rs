@@ -64,8 +64,8 @@ impl StopMonitor {
                 self.told_to_stand = Some(now);
             }
         } else {
-            self.driven =
-                counts.map(|counts| f64::from(counts).abs()).into_iter().fold(0.0, f64::max);
+            let [left, right] = counts.map(i16::unsigned_abs);
+            self.driven = left.max(right).into();
             self.told_to_stand = None;
             self.moving = Duration::ZERO;
             self.method = 0;
@@ -102,7 +102,8 @@ impl StopMonitor {
         }
         self.moves = moves;
         assert!(!moves || self.resting.is_zero());
-        let comes_to_rest = self.comes_to_rest();
+        let rests_s = comes_to_rest_s(self.response, self.driven / self.counts_per_m);
+        let comes_to_rest = Duration::from_secs_f64(rests_s);
         let due = |told: MissionTime| now.since(told).saturating_sub(gap) >= comes_to_rest;
         if !moves {
             self.moving = Duration::ZERO;
@@ -115,10 +116,6 @@ impl StopMonitor {
         self.moves = false;
         self.moving = Duration::ZERO;
         self.resting = Duration::ZERO;
-    }
-
-    fn comes_to_rest(&self) -> Duration {
-        Duration::from_secs_f64(comes_to_rest_s(self.response, self.driven / self.counts_per_m))
     }
 
     /// Returns the rest, which is unknown without two recent frames.
@@ -197,8 +194,7 @@ impl Monitor for StopMonitor {
     }
 
     fn explain(&self, _: Cause, _: Moment) -> Option<String> {
-        let text = "the robot was told to stand and its encoders report motion; the link tries every stop method in turn; check whether another host commands the robot";
-        Some(text.to_owned())
+        Some("the robot was told to stand and its encoders report motion; the link tries every stop method in turn; check whether another host commands the robot".to_owned())
     }
 }
 

@@ -11,10 +11,11 @@ use common::{
     samples::{Cause, CommandSample, ContactSample},
 };
 
-use super::monitor::{Condition, Moment, Monitor, Observation};
+use super::{
+    contact::STANDS_FOR,
+    monitor::{Condition, Moment, Monitor, Observation},
+};
 
-/// Least stand-still; the response may need more from top speed.
-const STANDS_FOR: Duration = Duration::from_millis(500);
 /// Half the mapped arc, radians: small enough to drive around, and at least a map cell.
 const HALF_WIDTH: RangeInclusive<f64> = PI / 12.0..=PI / 6.0;
 
@@ -86,6 +87,7 @@ impl Monitor for Touches {
         Self {
             feel: vec![false; rows.len()],
             rows,
+            // The response may need more from top speed.
             stands_for: STANDS_FOR.max(rests_after),
             moves: false,
             newest: None,
