@@ -162,10 +162,10 @@ impl Process for Shell {
             refused: None,
         };
         if let Some(memory) = memory {
-            shell.take(Event::Remember(memory), monotonic_ns())?;
+            shell.take(Event::Remember(memory))?;
         }
         if shell.marked {
-            shell.take(Event::Operator(Request::Stop), monotonic_ns())?;
+            shell.take(Event::Operator(Request::Stop))?;
         }
         Ok(shell)
     }
@@ -174,17 +174,15 @@ impl Process for Shell {
         self.take_operators_requests()?;
         self.maintain()?;
         if let Some(directive) = self.inputs.directive.newest()? {
-            let order = directive.order();
-            let reason = directive.reason();
-            self.take(Event::Order(order, reason), monotonic_ns())?;
+            self.take(Event::Order(directive.order(), directive.reason()))?;
         }
         // After the order, because the supervisor publishes the first limit before it.
         if let Some(limit) = self.inputs.tick_limit.newest()? {
             let TickLimitSample { last_tick, target_number, .. } = limit;
-            self.take(Event::TickLimit { last_tick, target_number }, monotonic_ns())?;
+            self.take(Event::TickLimit { last_tick, target_number })?;
         }
         while let Some(command) = self.inputs.command.next_sample()? {
-            self.take(Event::Command(command), monotonic_ns())?;
+            self.take(Event::Command(command))?;
         }
         let began_ns = monotonic_ns();
         loop {
@@ -198,14 +196,11 @@ impl Process for Shell {
             // came, and taken before them.
             let datagram = self.transport.receive(now_ns)?;
             let mut came = datagram.is_some();
+            let mut take =
+                |event: Event<'_>| self.runner.take_entry(Entry { event, machine_ns: now_ns, now });
             for (number, wire) in (0..).zip(&mut self.wires) {
                 while let Some(bytes) = wire.receive(now_ns)? {
-                    let event = Event::Sensor(number, bytes);
-                    effects.extend(self.runner.take_entry(Entry {
-                        event,
-                        machine_ns: now_ns,
-                        now,
-                    })?);
+                    effects.extend(take(Event::Sensor(number, bytes))?);
                     came = true;
                     if monotonic_ns() - began_ns > MOST_LISTENING_NS {
                         break;
@@ -213,8 +208,7 @@ impl Process for Shell {
                 }
             }
             if let Some(bytes) = datagram {
-                let event = Event::Datagram(bytes);
-                effects.extend(self.runner.take_entry(Entry { event, machine_ns: now_ns, now })?);
+                effects.extend(take(Event::Datagram(bytes))?);
             }
             self.carry_out(effects)?;
             if !came {
@@ -222,7 +216,7 @@ impl Process for Shell {
             }
         }
         self.maintain()?;
-        self.take(Event::Quiet, monotonic_ns())?;
+        self.take(Event::Quiet)?;
         self.answer_operators();
         if monotonic_ns() - self.stated_ns >= LINK.spec().restated_every().as_nanos() as u64 {
             self.keep_guard();
@@ -276,13 +270,13 @@ impl Process for Shell {
 
     fn idle(&mut self) -> Result<(), StageError> {
         if self.has_idle_work() {
-            self.take(Event::Telemetry, monotonic_ns())?;
+            self.take(Event::Telemetry)?;
         }
         Ok(())
     }
 
     fn stop(&mut self) -> Result<(), StageError> {
-        self.take(Event::End, monotonic_ns())?;
+        self.take(Event::End)?;
         self.runner.publish_rest()?;
         tracing::info!("stop sent to the robot");
         Ok(())
@@ -327,7 +321,7 @@ impl Shell {
         while let Some(request) = self.stop_socket.as_mut().and_then(StopSocket::take) {
             if matches!(request, Request::Stop | Request::Resume) {
                 tracing::warn!(?request, "an operator sent a request to the link directly");
-                self.take(Event::Operator(request), monotonic_ns())?;
+                self.take(Event::Operator(request))?;
             }
         }
         Ok(())
@@ -379,19 +373,19 @@ impl Shell {
     fn maintain(&mut self) -> Result<(), StageError> {
         let now_ns = monotonic_ns();
         if let Some(open) = self.transport.maintain(now_ns)? {
-            self.take(Event::Wire(open), now_ns)?;
+            self.take(Event::Wire(open))?;
         }
         for number in 0..self.wires.len() {
             if let Some(open) = self.wires[number].maintain(now_ns)? {
-                self.take(Event::SensorWire(number as u8, open), now_ns)?;
+                self.take(Event::SensorWire(number as u8, open))?;
             }
         }
         Ok(())
     }
 
-    fn take(&mut self, event: Event<'_>, machine_ns: u64) -> Result<(), StageError> {
-        let next_tick = self.runner.stage.link.state.next_tick;
-        let now = self.clock.at(next_tick, machine_ns);
+    fn take(&mut self, event: Event<'_>) -> Result<(), StageError> {
+        let machine_ns = monotonic_ns();
+        let now = self.clock.at(self.runner.stage.link.state.next_tick, machine_ns);
         let effects = self.runner.take_entry(Entry { event, machine_ns, now })?;
         self.carry_out(effects)
     }
