@@ -1,7 +1,7 @@
 //! Datagrams, accepted from the robot's address only.
 
 use std::{
-    io,
+    io::{self, ErrorKind},
     net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket},
     os::fd::{AsFd, BorrowedFd},
 };
@@ -46,18 +46,24 @@ impl Wire for Udp {
                 Ok((_, from)) => {
                     self.tally.foreign_datagrams += 1;
                     if from.ip() == self.robot.ip() && self.tally.other_port == 0 {
-                        let (port, expected) = (from.port(), self.robot.port());
                         tracing::warn!(
-                            port,
-                            expected,
+                            port = from.port(),
+                            expected = self.robot.port(),
                             "the robot's host answers from another port; check robot.address"
                         );
-                        self.tally.other_port = port;
+                        self.tally.other_port = from.port();
                     }
                 }
-                Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(None),
-                Err(error) if is_passing(&error) => {}
-                Err(error) => return Err(error),
+                Err(error) => match error.kind() {
+                    ErrorKind::WouldBlock => return Ok(None),
+                    // A signal came, or the robot is unreachable.
+                    ErrorKind::Interrupted
+                    | ErrorKind::ConnectionRefused
+                    | ErrorKind::HostUnreachable
+                    | ErrorKind::NetworkUnreachable
+                    | ErrorKind::NetworkDown => {}
+                    _ => return Err(error),
+                },
             }
         }
     }
@@ -77,16 +83,4 @@ impl Wire for Udp {
     fn tally(&self) -> Tally {
         self.tally
     }
-}
-
-/// Returns whether the robot is unreachable, or a signal came.
-fn is_passing(error: &io::Error) -> bool {
-    matches!(
-        error.kind(),
-        io::ErrorKind::Interrupted
-            | io::ErrorKind::ConnectionRefused
-            | io::ErrorKind::HostUnreachable
-            | io::ErrorKind::NetworkUnreachable
-            | io::ErrorKind::NetworkDown
-    )
 }
