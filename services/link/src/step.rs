@@ -315,12 +315,6 @@ impl Link {
         self.failsafe.orders.drive()
     }
 
-    /// Returns whether a held robot's ticks continue, so that it may be carried. In lockstep
-    /// mission time stands still.
-    fn stands_by(&self) -> bool {
-        !self.in_ticks() && self.failsafe.orders.stands_by()
-    }
-
     fn in_ticks(&self) -> bool {
         self.state.pace == Pace::Max
     }
@@ -334,7 +328,10 @@ impl Link {
     fn begin_tick(&mut self, motion: Motion) {
         // The last due answer shows the present state.
         self.due = self.due.saturating_sub(1);
-        if !self.ordered_to_drive() && !self.stands_by() {
+        // A held robot's ticks continue, so that it may be carried. In lockstep mission time stands
+        // still.
+        let stands_by = !self.in_ticks() && self.failsafe.orders.stands_by();
+        if !self.ordered_to_drive() && !stands_by {
             return;
         }
         if self.in_ticks() {

@@ -48,11 +48,6 @@ impl Orders {
     fn is(&self, order: Order) -> bool {
         self.newest.is_some_and(|directive| directive.order == order)
     }
-
-    fn held(&self) -> Option<HoldReason> {
-        let directive = self.newest?;
-        (directive.order == Order::Hold).then_some(directive.reason)
-    }
 }
 
 impl Monitor for Orders {
@@ -68,7 +63,8 @@ impl Monitor for Orders {
 
     fn condition(&self, cause: Cause, now: Moment) -> Condition {
         let age = |directive: Directive| now.machine_ns.saturating_sub(directive.heard_ns);
-        let holds = match (cause, self.held()) {
+        let held = self.newest.filter(|newest| newest.order == Order::Hold);
+        let holds = match (cause, held.map(|directive| directive.reason)) {
             (Cause::MissionOver, _) => self.is(Order::Stop),
             (Cause::OperatorStop, held) => self.stopped_here || held == Some(HoldReason::Operator),
             (Cause::StageHeld, held) => held == Some(HoldReason::StageHeld),

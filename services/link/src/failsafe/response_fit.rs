@@ -295,12 +295,11 @@ impl ResponseFit {
             .chain([f64::INFINITY]);
         for are_apart in [true, false].into_iter().skip(usize::from(self.judged() == 1)) {
             let share = if are_apart { TURN_SHARE } else { 1.0 };
-            let grid = accelerations.clone().map(|acceleration| {
+            let courses = |acceleration: f64| {
                 let most = acceleration * self.axle.counts_per_m;
-                let limits = Limits { are_apart, most: [most, most * share] };
-                self.courses(limits)
-            });
-            let grid: Vec<_> = grid.collect();
+                self.courses(Limits { are_apart, most: [most, most * share] })
+            };
+            let grid: Vec<_> = accelerations.clone().map(courses).collect();
             for step in 0..DEAD_TIMES {
                 let dead_time_s = f64::from(step) * DEAD_TIME_STEP_S;
                 let unlike = grid.iter().map(|(_, [_, turn])| self.unlike_turn(turn, dead_time_s));

@@ -219,13 +219,11 @@ impl Link {
 
     pub(super) fn keep_connected(&mut self) {
         let silent = self.failsafe.presence.is_silent(self.now_ns);
-        // A robot that waits for a command is present: if its next motor frame is missing, a
-        // datagram was lost.
-        let owes = self.ordered_to_drive() && self.open.is_none();
-        if silent && !self.in_ticks() {
+        let in_ticks = self.in_ticks();
+        if silent && !in_ticks {
             self.lose();
         }
-        if !self.in_ticks()
+        if !in_ticks
             && self.connected()
             && !self.failsafe.latency.is_testing()
             && self.other_stop().is_none()
@@ -236,10 +234,12 @@ impl Link {
             self.effects.extend(greetings.map(|(number, bytes)| Effect::SendSensor(number, bytes)));
             self.effects.push(Effect::AskedForStreams);
         }
-        let owing = self.in_ticks() && owes && silent && self.connected();
+        // A robot that waits for a command is present: if its next motor frame is missing, a
+        // datagram was lost.
+        let waits = in_ticks && self.connected() && self.ordered_to_drive() && self.open.is_none();
         if self.failsafe.presence.wants_ping(self.now_ns) {
             self.ping();
-        } else if owing && self.passed(self.pinged_ns, PING_EVERY) {
+        } else if waits && silent && self.passed(self.pinged_ns, PING_EVERY) {
             self.due = 0;
             self.ping();
         }
