@@ -20,7 +20,7 @@
 //! Single impossible counts are dropped ([`super::restart`]); [`MOST_JUMPS`] within
 //! [`JUMPS_WITHIN`] are suspect too.
 
-use std::{collections::VecDeque, time::Duration};
+use std::time::Duration;
 
 use common::{
     clock::MissionTime,
@@ -193,7 +193,8 @@ pub struct Odometry {
     evidence: [Evidence; 3],
     untold_s: f64,
     pub(crate) contacts: Contacts,
-    jumps: VecDeque<MissionTime>,
+    /// Newest first.
+    jumps: [Option<MissionTime>; MOST_JUMPS],
     recoveries: u32,
     suspicion: Option<(Suspicion, MissionTime)>,
     /// Time of the last search for a delay.
@@ -254,8 +255,7 @@ impl Odometry {
     fn plausible(&mut self, counts: impl Into<WheelCounts>, now: MissionTime) {
         let counts = counts.into();
         self.shares.rolled(counts, now.seconds());
-        let newest_jump = self.jumps.back().copied();
-        let calm = newest_jump.is_none_or(|jump| now.since(jump) >= CALM);
+        let calm = self.jumps[0].is_none_or(|jump| now.since(jump) >= CALM);
         if calm
             && self.recoveries < MOST_RECOVERIES
             && matches!(self.suspicion, Some((Suspicion::Jumps, _)))
@@ -399,13 +399,9 @@ impl Odometry {
     }
 
     fn implausible(&mut self, now: MissionTime) {
-        self.jumps.push_back(now);
-        if self.jumps.len() > MOST_JUMPS {
-            self.jumps.pop_front();
-        }
-        let first = self.jumps.front().copied().unwrap_or(now);
-        assert!((1..=MOST_JUMPS).contains(&self.jumps.len()));
-        if self.jumps.len() == MOST_JUMPS && now.since(first) <= JUMPS_WITHIN {
+        self.jumps.rotate_right(1);
+        self.jumps[0] = Some(now);
+        if self.jumps[MOST_JUMPS - 1].is_some_and(|first| now.since(first) <= JUMPS_WITHIN) {
             self.suspicion.get_or_insert((Suspicion::Jumps, now));
         }
     }
@@ -417,7 +413,7 @@ impl Odometry {
         self.clear_evidence();
         self.fit = ResponseFit::new(self.axle);
         self.contacts.reset();
-        self.jumps.clear();
+        self.jumps = Default::default();
         self.recoveries = 0;
         self.suspicion = None;
     }
@@ -458,7 +454,7 @@ impl Monitor for Odometry {
             evidence: Default::default(),
             untold_s: 0.0,
             contacts: Contacts::new(mission),
-            jumps: VecDeque::new(),
+            jumps: Default::default(),
             recoveries: 0,
             suspicion: None,
             looked: MissionTime::default(),
@@ -490,7 +486,7 @@ impl Monitor for Odometry {
     }
 
     fn condition(&self, cause: Cause, now: Moment) -> Condition {
-        match (cause, self.suspicion, self.jumps.back()) {
+        match (cause, self.suspicion, self.jumps[0]) {
             (Cause::WheelsHeld, ..) => self.contacts.condition(now.time),
             // The mission continues while the robot must not drive.
             (Cause::OdometryGivenUp, Some((_, since)), _) => {
@@ -498,7 +494,7 @@ impl Monitor for Odometry {
             }
             (Cause::OdometryGivenUp, None, _) => false.into(),
             (_, Some(_), _) => Condition::Holds,
-            (_, None, Some(&jump)) => Condition::OverFor(now.time.since(jump)),
+            (_, None, Some(jump)) => Condition::OverFor(now.time.since(jump)),
             (_, None, None) => false.into(),
         }
     }
@@ -508,7 +504,7 @@ impl Monitor for Odometry {
             .evidence
             .map(|it| (it.against_s / SUSPECTED_AFTER_S).max(it.still_s / STILL_AFTER_S));
         doubts.uncommanded = self.untold_s / UNTOLD_AFTER_S;
-        doubts.jumps = self.jumps.len() as f64 / MOST_JUMPS as f64;
+        doubts.jumps = self.jumps.iter().flatten().count() as f64 / MOST_JUMPS as f64;
     }
 
     fn explain(&self, cause: Cause, now: Moment) -> Option<String> {

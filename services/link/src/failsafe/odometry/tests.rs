@@ -1,6 +1,7 @@
 use super::*;
 use crate::testing::*;
 use common::{samples::ContactSample, wire::COUNT_CYCLE};
+use std::collections::VecDeque;
 
 /// One wheel turn per second, 0.53 m/s.
 const TURN: i16 = 1200;
