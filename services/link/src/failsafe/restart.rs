@@ -35,7 +35,7 @@ pub struct RestartWatch {
     last: Option<Frame>,
     /// Reported and counted speeds at the last plausible counts, counts/s.
     turned: [[f64; 2]; 2],
-    /// Recent commands, which the wheels may still follow.
+    /// Newest commands. The wheels may still follow the recent ones.
     commanded: VecDeque<(MissionTime, [f64; 2])>,
     /// Newest implausible counts, their time, and the number of consistent frames.
     suspected: Option<(Frame, u32)>,
@@ -62,9 +62,9 @@ impl RestartWatch {
 
     /// Takes counts/s.
     pub fn commanded(&mut self, counts: [i16; 2], now: MissionTime) {
-        let is_old = |(at, _): &(MissionTime, _)| !self.is_recent(*at, now);
-        let old = self.commanded.iter().take_while(|it| is_old(it)).count();
-        self.commanded.drain(..old.max(self.commanded.len().saturating_sub(MOST_KEPT)));
+        if self.commanded.len() > MOST_KEPT {
+            self.commanded.pop_front();
+        }
         self.commanded.push_back((now, counts.map(f64::from)));
     }
 
