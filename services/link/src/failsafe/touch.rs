@@ -21,8 +21,8 @@ const HALF_WIDTH: RangeInclusive<f64> = PI / 12.0..=PI / 6.0;
 
 #[derive(Clone, Debug)]
 pub struct Touches {
-    rows: Vec<TouchRow>,
-    feel: Vec<bool>,
+    /// With whether each is triggered.
+    rows: Vec<(TouchRow, bool)>,
     stands_for: Duration,
     /// Whether the robot moves. At rest, or carried, its own motion causes no touch.
     moves: bool,
@@ -34,7 +34,7 @@ pub struct Touches {
 impl Touches {
     fn take(&mut self, touched: &[(usize, bool)], now: MissionTime) {
         for &(row, feels) in touched {
-            let Some(felt) = self.feel.get_mut(row) else {
+            let Some((_, felt)) = self.rows.get_mut(row) else {
                 continue;
             };
             let before = std::mem::replace(felt, feels);
@@ -52,7 +52,7 @@ impl Touches {
     pub(crate) fn take_contact(&mut self, now: MissionTime) -> Option<ContactSample> {
         let (row, _) = self.newest.filter(|_| !self.is_told && !self.stands(now))?;
         self.is_told = true;
-        let TouchRow { bearing_deg, wide_deg, .. } = self.rows[row];
+        let (TouchRow { bearing_deg, wide_deg, .. }, _) = self.rows[row];
         let half_width = wide_deg.to_radians() / 2.0;
         Some(ContactSample {
             bearing_rad: bearing_deg.to_radians(),
@@ -65,8 +65,7 @@ impl Touches {
     /// the robot also stops by it. Cars have no touch sensors.
     pub(crate) fn permitted(&self, command: &CommandSample, now: MissionTime) -> CommandSample {
         let CommandSample { left_rad_s: left, right_rad_s: right, .. } = *command;
-        assert_eq!(self.rows.len(), self.feel.len());
-        let felt = self.rows.iter().zip(&self.feel).filter(|(_, feels)| **feels);
+        let felt = self.rows.iter().filter(|(_, feels)| *feels);
         let mut towards = felt.map(|(row, _)| (left + right) * row.bearing_deg.to_radians().cos());
         let turn = if self.stands(now) {
             0.0
@@ -81,12 +80,11 @@ impl Touches {
 
 impl Monitor for Touches {
     fn new(mission: &Mission) -> Self {
-        let (body, rows) = (mission.body(), mission.touches());
+        let body = mission.body();
         let brakes_s = body.top_speed_m_s / body.response.acceleration_m_s2;
         let rests_after = Duration::from_secs_f64(body.response.dead_time_s() + brakes_s);
         Self {
-            feel: vec![false; rows.len()],
-            rows,
+            rows: mission.touches().into_iter().map(|row| (row, false)).collect(),
             // The response may need more from top speed.
             stands_for: STANDS_FOR.max(rests_after),
             moves: false,
@@ -109,7 +107,7 @@ impl Monitor for Touches {
 
     fn explain(&self, _: Cause, _: Moment) -> Option<String> {
         let (row, _) = self.newest?;
-        let name = &self.rows[row].name;
+        let name = &self.rows[row].0.name;
         Some(format!(
             "{name} detects a contact or a cliff; the robot stands, and then drives around it"
         ))
