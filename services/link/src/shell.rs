@@ -41,7 +41,7 @@ use crate::{
 /// The step reports one refused message a second.
 const REFUSAL_LASTS_NS: u64 = 2_000_000_000;
 /// Interval of the checks without input: a fifth of the shortest deadline.
-const LOOKS_AGAIN: Duration = Duration::from_millis(20);
+pub(crate) const LOOKS_AGAIN: Duration = Duration::from_millis(20);
 
 /// Longest delay of the heartbeat by a flood, besides one datagram. The rest waits for the next
 /// turn.
@@ -291,8 +291,7 @@ fn without(what: &'static str) -> impl Fn(&io::Error) {
     move |error| tracing::error!(%error, "the link goes on without its {what}")
 }
 
-fn log_battery(change: &BatteryChange) {
-    let BatteryChange { pack, volts, charge } = *change;
+fn log_battery(BatteryChange { pack, volts, charge }: BatteryChange) {
     let volts = format!("{volts:.1}");
     match charge {
         Charge::Empty => {
@@ -466,7 +465,7 @@ impl Shell {
                 Effect::AskedForStreams => {
                     tracing::info!("the link requests the robot's streams again");
                 }
-                Effect::Battery(change) => log_battery(&change),
+                Effect::Battery(change) => log_battery(change),
                 // Published by the stage.
                 Effect::Tick { .. }
                 | Effect::Infrared(_)

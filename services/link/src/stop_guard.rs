@@ -30,6 +30,7 @@ use common::{
 use rustix::process::setsid;
 
 use crate::{
+    shell::LOOKS_AGAIN,
     step::{Effect, Entry, Event, Link, State},
     transport::Transport,
     wire_owner::{Found, Role},
@@ -38,7 +39,6 @@ use crate::{
 /// Argument of `firsthand stage`.
 pub const NAME: &str = "stop-guard";
 
-const LOOKS_AGAIN: Duration = Duration::from_millis(20);
 /// Check interval for a silent robot. Frames and requests wake the guard.
 const LOOKS_FOR_SILENT: Duration = Duration::from_millis(200);
 /// The machine may be out of descriptors or ports.

@@ -115,11 +115,9 @@ impl OtherCommander {
                 self.shared += 1;
             }
             self.most = self.most.max(frames);
-            let is_sure = self.shared >= WINDOWS;
-            self.shows = self.window.shows().or_else(|| {
-                is_sure
-                    .then_some("acknowledges all commands and sends part of its frames elsewhere")
-            });
+            let shares = (self.shared >= WINDOWS)
+                .then_some("acknowledges all commands and sends part of its frames elsewhere");
+            self.shows = self.window.shows().or(shares);
             self.window = Window { began_ns: now_ns, ..Window::default() };
         }
     }

@@ -12,8 +12,8 @@ use glam::DVec2;
 
 use super::keep;
 
-/// Bound on kept poses.
-const MOST_KEPT: usize = 2048;
+/// Bound on kept poses and scans.
+pub(super) const MOST_KEPT: usize = 2048;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Hypothesis {

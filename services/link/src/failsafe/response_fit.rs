@@ -219,11 +219,10 @@ impl ResponseFit {
             let (wheels, factor) = self.of_wheels(&channels);
             (scale * wheels.unlike(factor), scale * wheels.turned, factor)
         };
-        let of = |it: Response| {
+        let believed = believed.map(|it| {
             let (limits, courses) = self.courses(self.axle.limits(&it));
             fit(self.motions(it.dead_time_s(), limits, courses.each_ref(), *first_s)).0
-        };
-        let believed = believed.map(of);
+        });
         // Most robots answer as stated: even a perfect fit is not far better.
         if believed.is_some_and(|believed| !is_far_better(0.0, believed)) {
             return None;

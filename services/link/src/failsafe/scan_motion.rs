@@ -14,7 +14,7 @@ use super::{
     motion_bank::{
         Bank,
         Hypothesis::{self, Late, Longer, Rolls, Scaled},
-        Poses, Row,
+        MOST_KEPT, Poses, Row,
     },
     repeats::Repeats,
 };
@@ -43,8 +43,6 @@ const ALL: [Row; 16] = [
 const LIMITS: [f64; 2] = [0.045, 0.08];
 const APART_S: f64 = 0.45;
 const MOST_APART_S: f64 = 1.0;
-/// Bound on kept scans.
-const MOST_KEPT: usize = 2048;
 const BEAMS: usize = 180;
 /// Beams whose repetitions are judged.
 const REPEATING: usize = 12;
@@ -70,8 +68,8 @@ pub(super) struct ScanMotion {
 
 impl ScanMotion {
     pub(super) fn new(row: usize, sensor: Sensor) -> Self {
-        let (scans, better) = (VecDeque::new(), Bank::of(&ALL));
-        Self { row, sensor, scans, better, repeats: Repeats::default() }
+        let (better, repeats) = (Bank::of(&ALL), Repeats::default());
+        Self { row, sensor, scans: VecDeque::new(), better, repeats }
     }
 
     pub(super) fn reset(&mut self) {

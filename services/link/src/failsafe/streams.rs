@@ -25,9 +25,8 @@ pub(crate) const SHORT_ONES: usize = 2;
 const FIRST_PAUSE: Duration = Duration::from_secs(1);
 const LONGEST_PAUSE: Duration = Duration::from_secs(8);
 
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Motor {
-    #[default]
     Regular,
     Silent,
     /// Frames per second, too few to keep a command alive.

@@ -66,12 +66,10 @@ impl Link {
             self.send(self.stop());
             let method = self.other_stop().map_or("velocity 0", |other| other.name);
             self.effects.push(Effect::StopBy(method));
-        } else if does_not_stop {
-            // The last method needs time to take effect.
-            return;
-        } else if self.is_stop_due() {
+        } else if !does_not_stop && self.is_stop_due() {
             self.send(self.stop());
         } else {
+            // The last method needs time to take effect.
             return;
         }
         self.commanded([0, 0]);
