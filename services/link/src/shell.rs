@@ -177,8 +177,8 @@ impl Process for Shell {
             self.take(Event::Order(directive.order(), directive.reason()))?;
         }
         // After the order, because the supervisor publishes the first limit before it.
-        if let Some(limit) = self.inputs.tick_limit.newest()? {
-            let TickLimitSample { last_tick, target_number, .. } = limit;
+        let limit = self.inputs.tick_limit.newest()?;
+        if let Some(TickLimitSample { last_tick, target_number, .. }) = limit {
             self.take(Event::TickLimit { last_tick, target_number })?;
         }
         while let Some(command) = self.inputs.command.next_sample()? {

@@ -126,8 +126,8 @@ impl Transport {
     /// Maintains the wire. Returns whether it is open if that changed since the last report. A
     /// close and a reopening come separately.
     pub fn maintain(&mut self, now_ns: u64) -> Result<Option<bool>, TransportError> {
-        let closed_unreported = self.reported == Some(true) && !self.is_open();
-        if !closed_unreported {
+        // An unreported close is reported before the wire reopens.
+        if self.reported != Some(true) || self.is_open() {
             self.wire.maintain(now_ns).map_err(|source| self.broken(source))?;
         }
         let open = Some(self.is_open());

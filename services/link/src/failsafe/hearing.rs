@@ -146,8 +146,7 @@ impl Hearing {
             frame.answers |= status != RangeStatus::Invalid;
             if status == RangeStatus::Measured {
                 frame.hears = true;
-                let is_end = reading.range_m > END_SHARE * sensor.reach_m;
-                frame.ends += f64::from(u8::from(is_end));
+                frame.ends += f64::from(reading.range_m > END_SHARE * sensor.reach_m);
             }
             if sensor.kind != SensorKind::Cone {
                 continue;

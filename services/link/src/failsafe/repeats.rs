@@ -92,7 +92,7 @@ impl Repeats {
 
     /// Returns the greatest evidence of a lag; 1 is sure.
     pub(super) fn doubt(&self) -> f64 {
-        self.sums.iter().fold(0.0, |most: f64, sum| most.max(sum / LIMITS[1]))
+        self.sums.into_iter().fold(0.0, f64::max) / LIMITS[1]
     }
 }
 

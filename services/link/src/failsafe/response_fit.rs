@@ -193,13 +193,12 @@ impl ResponseFit {
                 unlike <= LATER_UNEXPLAINED * wheels.turned && (self.judged() == 1 || turns);
             (scale * unlike, later_s, explains)
         };
-        let later = (-LATER_STEPS..=LATER_STEPS)
+        let (later, prompt): (Vec<_>, Vec<_>) = (-LATER_STEPS..=LATER_STEPS)
             .map(|step| f64::from(step) * LATER_STEP_S)
             .chain([-stated.dead_time_s()])
             .filter(|later_s| stated.dead_time_s() + later_s >= 0.0)
-            .map(fit);
-        let (later, prompt): (Vec<_>, Vec<_>) =
-            later.partition(|(_, later_s, _)| *later_s >= LEAST_LATER_S);
+            .map(fit)
+            .partition(|(_, later_s, _)| *later_s >= LEAST_LATER_S);
         // In repeating motion, an early base looks like one a whole round late.
         let prompt = prompt.into_iter().map(|(unlike, ..)| unlike).fold(f64::INFINITY, f64::min);
         let (unlike, later_s, explains) =

@@ -156,10 +156,10 @@ impl Monitor for Streams {
             Observation::Motor(..) => self.motor(now.time, now.machine_ns),
             Observation::Readings(readings) => {
                 for sensor in &mut self.sensors {
-                    let is_valid = |reading: &&RangeReading| {
+                    let is_valid = |reading: &RangeReading| {
                         reading.sensor == sensor.row && reading.status() != RangeStatus::Invalid
                     };
-                    if readings.iter().any(|reading| is_valid(&reading)) {
+                    if readings.iter().any(is_valid) {
                         sensor.ns = now.machine_ns;
                     }
                 }

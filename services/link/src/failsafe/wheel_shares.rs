@@ -243,13 +243,13 @@ impl WheelShares {
     }
 
     fn is_steady(&self, least_m: f64) -> bool {
-        let steady = |kind: usize, wheel: usize| {
+        let is_steady = |(kind, wheel): (usize, usize)| {
             let ways = self.newest.map(|tick| tick[kind][wheel]);
             let along = ways.map(|way| way * ways[STEADY - 1].signum());
             let least = along.into_iter().fold(f64::INFINITY, f64::min);
             least >= least_m && least >= AGREE * along.into_iter().fold(0.0, f64::max)
         };
-        [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter().all(|(kind, wheel)| steady(kind, wheel))
+        [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter().all(is_steady)
     }
 
     pub(crate) fn adopt(&mut self, response: Response) {

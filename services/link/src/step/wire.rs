@@ -88,9 +88,7 @@ impl Link {
         if heard.pinged {
             self.send(self.base.acknowledge());
         }
-        if heard.jumped {
-            self.restart.jumped = true;
-        }
+        self.restart.jumped |= heard.jumped;
         let motion = heard.motion;
         let counts = motion.map(|motion| self.judge_counts(&motion));
         if counts == Some(Counts::Elsewhere) {
@@ -177,10 +175,9 @@ impl Link {
             self.stamped = Some((stamp_ns, self.now));
         }
         for scan in &heard.scans {
-            let came_s = own_wire.unwrap_or(self.now).seconds();
             let (first_s, first_beam_ns) = match (scan.stamp_ns, self.stamped) {
                 (Some(scan_ns), Some((motion_ns, at))) => (at.seconds(), scan_ns - motion_ns),
-                _ => (came_s, scan.sweep.first_beam_ns),
+                _ => (own_wire.unwrap_or(self.now).seconds(), scan.sweep.first_beam_ns),
             };
             let middle_ns = Sweep { first_beam_ns, ..scan.sweep }.middle_ns(scan.beams.len());
             self.observe(Observation::Scan(scan, first_s + middle_ns as f64 * 1e-9));
@@ -230,8 +227,10 @@ impl Link {
             && self.failsafe.streams.wants_request(self.now_ns)
         {
             self.send(self.base.ask_for_sensors());
-            let greetings = (0..).zip(self.drivers.iter().map(|driver| driver.greeting()));
-            self.effects.extend(greetings.map(|(number, bytes)| Effect::SendSensor(number, bytes)));
+            let greetings = (0..).zip(&self.drivers);
+            let greetings =
+                greetings.map(|(number, driver)| Effect::SendSensor(number, driver.greeting()));
+            self.effects.extend(greetings);
             self.effects.push(Effect::AskedForStreams);
         }
         // A robot that waits for a command is present: if its next motor frame is missing, a

@@ -57,10 +57,9 @@ impl Dial for Serial {
             | ControlModes::PARENB
             | ControlModes::CSTOPB
             | ControlModes::CRTSCTS;
-        settings.control_modes.remove(flow);
         // An Arduino restarts when DTR rises. Without HUPCL it stays high after this process, so
         // the stop guard and the next link do not restart the board.
-        settings.control_modes.remove(ControlModes::HUPCL);
+        settings.control_modes.remove(flow | ControlModes::HUPCL);
         // CLOCAL ignores modem lines: three wires suffice.
         let eight = ControlModes::CS8 | ControlModes::CLOCAL | ControlModes::CREAD;
         settings.control_modes.insert(eight);
