@@ -29,26 +29,18 @@ const LEAST_M: f64 = 1.5;
 const LEAST_RAD: f64 = 3.0;
 const LEAST_REST_S: f64 = 2.0;
 
-struct Rest {
-    seconds: f64,
-    bias_rad_s: f64,
-    /// Variance of a turn, rad^2/s.
-    noise: f64,
-}
-
-impl Rest {
-    fn of(increments: &[(f64, f64)]) -> Result<Self, Refusal> {
-        let seconds = increments.iter().map(|it| it.0).sum::<f64>();
-        if increments.len() < 3 || seconds < LEAST_REST_S {
-            return Err(Refusal::NoRest { seconds });
-        }
-        let bias_rad_s = increments.iter().map(|it| it.1).sum::<f64>() / seconds;
-        let square = |(seconds, turn): &(f64, f64)| (turn - bias_rad_s * seconds).powi(2);
-        let freedom = (increments.len() - 1) as f64;
-        let mean_s = seconds / increments.len() as f64;
-        let noise = increments.iter().map(square).sum::<f64>() / freedom / mean_s;
-        Ok(Self { seconds, bias_rad_s, noise })
+/// Returns the seconds of a rest, the gyro's bias in it, rad/s, and the variance of a turn, rad^2/s.
+fn rest(increments: &[(f64, f64)]) -> Result<[f64; 3], Refusal> {
+    let seconds = increments.iter().map(|it| it.0).sum::<f64>();
+    if increments.len() < 3 || seconds < LEAST_REST_S {
+        return Err(Refusal::NoRest { seconds });
     }
+    let bias_rad_s = increments.iter().map(|it| it.1).sum::<f64>() / seconds;
+    let square = |(seconds, turn): &(f64, f64)| (turn - bias_rad_s * seconds).powi(2);
+    let freedom = (increments.len() - 1) as f64;
+    let mean_s = seconds / increments.len() as f64;
+    let noise = increments.iter().map(square).sum::<f64>() / freedom / mean_s;
+    Ok([seconds, bias_rad_s, noise])
 }
 
 /// Estimates ratio and track.
@@ -64,7 +56,7 @@ pub fn checked(
     scale_sd: f64,
     track_m: f64,
 ) -> Result<Estimate, Refusal> {
-    let Rest { seconds, bias_rad_s, noise } = Rest::of(at_rest)?;
+    let [seconds, bias_rad_s, noise] = rest(at_rest)?;
     let turned = |it: &Motion| it.turned_rad - bias_rad_s * it.seconds;
     let driven_m = motions.iter().map(|it| f64::midpoint(it.left_m, it.right_m).abs()).sum();
     let turned_rad = motions.iter().map(|it| turned(it).abs()).sum();

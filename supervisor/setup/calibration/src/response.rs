@@ -133,10 +133,11 @@ impl Fit {
         let Response { lag_s, acceleration_m_s2, turn_acceleration_rad_s2, .. } = body.response;
         let stated = turn_acceleration_rad_s2.min(acceleration_m_s2 / (body.track_m / 2.0));
         let fit = |delay_s: f64, acceleration| {
-            let model = Model { delay_s: delay_s.max(0.0), lag_s, acceleration };
-            let (explained, factor) = model.explains(commands, headings, window, by)?;
+            let delay_s = delay_s.max(0.0);
+            let model = [delay_s, lag_s, acceleration];
+            let (explained, factor) = explains(model, commands, headings, window, by)?;
             // A base that turns at half the rate reaches it in half the time.
-            Some(Self { delay_s: model.delay_s, acceleration: factor * acceleration, explained })
+            Some(Self { delay_s, acceleration: factor * acceleration, explained })
         };
         let best = |delays: Range<i32>, from_s: f64, step_s: f64| {
             let at = |step: i32| from_s + f64::from(step) * step_s;
@@ -160,54 +161,46 @@ impl Fit {
     }
 }
 
-/// Model of a base: a delay, and a lag of limited acceleration.
-#[derive(Clone, Copy)]
-struct Model {
-    delay_s: f64,
-    lag_s: f64,
-    acceleration: f64,
-}
-
-impl Model {
-    /// Returns the squared correlation and ratio of measured and modelled turns within `window`.
-    /// Link or base may turn slower than commanded.
-    fn explains(
-        self,
-        commands: &[(f64, f64)],
-        headings: &[(f64, f64)],
-        window: (f64, f64),
-        by: By,
-    ) -> Option<(f64, f64)> {
-        // The model starts at rest, and needs time to forget that.
-        let begins = window.0 - self.delay_s - 2.0 * LEG_S;
-        let mut waiting = commands.iter().skip_while(|(at, _)| *at < begins).peekable();
-        let share = if self.lag_s > 0.0 { 1.0 - (-STEP_S / self.lag_s).exp() } else { 1.0 };
-        let most = self.acceleration * STEP_S;
-        let (mut target, mut speed, mut turned) = (0.0, 0.0, [0.0; 2]);
-        let mut seen = Vec::new();
-        for pair in headings.windows(2).filter(|pair| (begins..window.1).contains(&pair[1].0)) {
-            let [(from, heading), (until, then)] = [pair[0], pair[1]];
-            if by == By::Turns {
-                turned = [0.0; 2];
-            }
-            let steps = ((until - from) / STEP_S).round().clamp(1.0, MOST_STEPS);
-            for step in 1..=steps as u32 {
-                let now = from + (until - from) * f64::from(step) / steps;
-                while let Some((_, rate)) = waiting.next_if(|(at, _)| at + self.delay_s <= now) {
-                    target = *rate;
-                }
-                speed += ((target - speed) * share).clamp(-most, most);
-                turned[0] += speed * (until - from) / steps;
-            }
-            turned[1] += wrap_angle(then - heading);
-            if until >= window.0 {
-                seen.push(turned);
-            }
+/// Returns the squared correlation and ratio of measured and modelled turns within `window`. Link or
+/// base may turn slower than commanded.
+///
+/// The model of a base is a delay, and a lag of limited acceleration.
+fn explains(
+    [delay_s, lag_s, acceleration]: [f64; 3],
+    commands: &[(f64, f64)],
+    headings: &[(f64, f64)],
+    window: (f64, f64),
+    by: By,
+) -> Option<(f64, f64)> {
+    // The model starts at rest, and needs time to forget that.
+    let begins = window.0 - delay_s - 2.0 * LEG_S;
+    let mut waiting = commands.iter().skip_while(|(at, _)| *at < begins).peekable();
+    let share = if lag_s > 0.0 { 1.0 - (-STEP_S / lag_s).exp() } else { 1.0 };
+    let most = acceleration * STEP_S;
+    let (mut target, mut speed, mut turned) = (0.0, 0.0, [0.0; 2]);
+    let mut seen = Vec::new();
+    for pair in headings.windows(2).filter(|pair| (begins..window.1).contains(&pair[1].0)) {
+        let [(from, heading), (until, then)] = [pair[0], pair[1]];
+        if by == By::Turns {
+            turned = [0.0; 2];
         }
-        let [model, both, turned] = spread(&seen);
-        (model > 0.0 && turned > 0.0 && both > 0.0)
-            .then(|| (both * both / (model * turned), both / model))
+        let steps = ((until - from) / STEP_S).round().clamp(1.0, MOST_STEPS);
+        for step in 1..=steps as u32 {
+            let now = from + (until - from) * f64::from(step) / steps;
+            while let Some((_, rate)) = waiting.next_if(|(at, _)| at + delay_s <= now) {
+                target = *rate;
+            }
+            speed += ((target - speed) * share).clamp(-most, most);
+            turned[0] += speed * (until - from) / steps;
+        }
+        turned[1] += wrap_angle(then - heading);
+        if until >= window.0 {
+            seen.push(turned);
+        }
     }
+    let [model, both, turned] = spread(&seen);
+    (model > 0.0 && turned > 0.0 && both > 0.0)
+        .then(|| (both * both / (model * turned), both / model))
 }
 
 /// Returns the centred sums of squares and products: first values, both, second values.
