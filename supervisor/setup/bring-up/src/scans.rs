@@ -248,48 +248,51 @@ impl<'a> Problem<'a> {
         ends.into_iter().map(|end| self.beyond(end?, unknowns)).collect()
     }
 
-    /// Performs a Gauss-Newton iteration; points at `half_m` count half.
+    /// Performs the Gauss-Newton iterations of a stage; points at `half_m` count half.
     fn improve(
         &self,
         hypothesis: Hypothesis,
         unknowns: &mut Unknowns,
-        (most_turn, half_m): (f64, f64),
+        (most_turn, half_m, rounds): (f64, f64, usize),
     ) {
         const { assert!(CURL + 1 == UNKNOWNS) };
-        let now = self.residuals(hypothesis, unknowns, most_turn);
-        let shifted: Vec<_> = (0..UNKNOWNS)
-            .map(|it| {
-                let mut shifted = *unknowns;
-                shifted[it] += STEPS[it];
-                self.residuals(hypothesis, &shifted, most_turn)
-            })
-            .collect();
-        assert!(shifted.iter().all(|it| it.len() == now.len()));
-        let mut normal = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::zeros();
-        let mut right = Unknowns::zeros();
-        for (point, residual) in now.iter().enumerate() {
-            let Some(residual) = residual else { continue };
-            let weight = (1.0 + (residual / half_m).powi(2)).powi(-2);
-            let mut slope = Unknowns::zeros();
-            for it in 0..UNKNOWNS {
-                let Some(there) = shifted[it][point] else { continue };
-                // At an edge of the reference the difference is meaningless as a slope.
-                let difference = there - residual;
-                if difference.abs() < 0.1 {
-                    slope[it] = difference / STEPS[it];
+        for _ in 0..rounds {
+            let now = self.residuals(hypothesis, unknowns, most_turn);
+            let shifted: Vec<_> = (0..UNKNOWNS)
+                .map(|it| {
+                    let mut shifted = *unknowns;
+                    shifted[it] += STEPS[it];
+                    self.residuals(hypothesis, &shifted, most_turn)
+                })
+                .collect();
+            assert!(shifted.iter().all(|it| it.len() == now.len()));
+            let mut normal = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::zeros();
+            let mut right = Unknowns::zeros();
+            for (point, residual) in now.iter().enumerate() {
+                let Some(residual) = residual else { continue };
+                let weight = (1.0 + (residual / half_m).powi(2)).powi(-2);
+                let mut slope = Unknowns::zeros();
+                for it in 0..UNKNOWNS {
+                    let Some(there) = shifted[it][point] else { continue };
+                    // At an edge of the reference the difference is meaningless as a slope.
+                    let difference = there - residual;
+                    if difference.abs() < 0.1 {
+                        slope[it] = difference / STEPS[it];
+                    }
                 }
+                normal += weight * slope * slope.transpose() / half_m.powi(2);
+                right -= weight * slope * *residual / half_m.powi(2);
             }
-            normal += weight * slope * slope.transpose() / half_m.powi(2);
-            right -= weight * slope * *residual / half_m.powi(2);
-        }
-        for it in 0..UNKNOWNS {
-            normal[(it, it)] += PRIOR[it].powi(-2);
-            // The yaw may start anywhere, so its prior is flat.
-            right[it] -= if it == YAW { 0.0 } else { unknowns[it] * PRIOR[it].powi(-2) };
-        }
-        if let Some(change) = normal.cholesky().map(|it| it.solve(&right)) {
-            let longest = (0..UNKNOWNS).map(|it| (change[it] / (0.3 * PRIOR[it].min(1.0))).abs());
-            *unknowns += change / longest.fold(1.0, f64::max);
+            for it in 0..UNKNOWNS {
+                normal[(it, it)] += PRIOR[it].powi(-2);
+                // The yaw may start anywhere, so its prior is flat.
+                right[it] -= if it == YAW { 0.0 } else { unknowns[it] * PRIOR[it].powi(-2) };
+            }
+            if let Some(change) = normal.cholesky().map(|it| it.solve(&right)) {
+                let longest =
+                    (0..UNKNOWNS).map(|it| (change[it] / (0.3 * PRIOR[it].min(1.0))).abs());
+                *unknowns += change / longest.fold(1.0, f64::max);
+            }
         }
     }
 
@@ -318,10 +321,8 @@ pub(crate) fn place(mission: &Mission, trace: &Trace, motion: &Motion) -> Option
     {
         let mut unknowns = Unknowns::zeros();
         unknowns[YAW] = TAU * start as f64 / STARTS as f64;
-        for (most_turn, half_m, rounds) in STAGES {
-            for _ in 0..rounds {
-                problem.improve(hypothesis, &mut unknowns, (most_turn, half_m));
-            }
+        for stage in STAGES {
+            problem.improve(hypothesis, &mut unknowns, stage);
         }
         let share = problem.placed(hypothesis, &unknowns);
         let likely = share - UNLIKELY * (unknowns[TURN].abs() + unknowns[WAY].abs());
@@ -332,10 +333,7 @@ pub(crate) fn place(mission: &Mission, trace: &Trace, motion: &Motion) -> Option
     }
     let (_, hypothesis, mut unknowns) = best?;
     (problem.every, problem.beams_of_each) = (1, BEAMS);
-    let [.., (most_turn, half_m, rounds)] = STAGES;
-    for _ in 0..rounds {
-        problem.improve(hypothesis, &mut unknowns, (most_turn, half_m));
-    }
+    problem.improve(hypothesis, &mut unknowns, STAGES[STAGES.len() - 1]);
     let share = problem.placed(hypothesis, &unknowns);
     unknowns[YAW] = wrap_angle(unknowns[YAW]);
     Some(Placed {
