@@ -414,8 +414,12 @@ impl fmt::Display for Status<'_> {
         if let Some(link) = &self.link {
             writeln!(f, "{link}")?;
         }
-        if let Some(power) = &self.power {
-            writeln!(f, "{power}")?;
+        if let Some(PowerStatus { board_v, motor_v, servo_v, low }) = &self.power {
+            let word = if *low { "BATTERY LOW" } else { "batteries" };
+            writeln!(
+                f,
+                "{word}: board {board_v:.1} V, motors {motor_v:.1} V, servos {servo_v:.1} V"
+            )?;
         }
         if let Some(ComplaintStatus { stage, trouble }) = &self.complaint {
             writeln!(f, "{stage}: {trouble}")?;
@@ -472,16 +476,5 @@ impl fmt::Display for LinkStatus {
             }
             Some(cause) => write!(f, "; it {}: {cause}", self.robot),
         }
-    }
-}
-
-impl fmt::Display for PowerStatus {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let word = if self.low { "BATTERY LOW" } else { "batteries" };
-        write!(
-            f,
-            "{word}: board {:.1} V, motors {:.1} V, servos {:.1} V",
-            self.board_v, self.motor_v, self.servo_v
-        )
     }
 }
