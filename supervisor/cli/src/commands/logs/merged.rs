@@ -44,8 +44,9 @@ impl Logs {
         let mut processes = Vec::new();
         for entry in fs::read_dir(directory)? {
             let file = entry?.file_name();
-            processes
-                .extend(file.to_str().and_then(|file| file.strip_suffix(LOG)).map(str::to_owned));
+            if let Some(process) = file.to_str().and_then(|file| file.strip_suffix(LOG)) {
+                processes.push(process.to_owned());
+            }
         }
         processes.sort();
         Ok(processes)
@@ -57,7 +58,15 @@ impl Logs {
             let wanted = self.process.as_ref().is_none_or(|only| *only == process);
             if wanted && self.logs.iter().all(|log| log.process != process) {
                 let file = File::open(self.directory.join(format!("{process}{LOG}")))?;
-                self.logs.push(Log::new(process, file));
+                self.logs.push(Log {
+                    process,
+                    file: BufReader::new(file),
+                    end: 0,
+                    position: 0,
+                    unfinished: Vec::new(),
+                    head: None,
+                    time: String::new(),
+                });
             }
         }
         // Reading all lengths first keeps the order across rounds.
@@ -79,18 +88,6 @@ impl Logs {
 }
 
 impl Log {
-    fn new(process: String, file: File) -> Self {
-        Self {
-            process,
-            file: BufReader::new(file),
-            end: 0,
-            position: 0,
-            unfinished: Vec::new(),
-            head: None,
-            time: String::new(),
-        }
-    }
-
     fn advance(&mut self) -> io::Result<()> {
         if self.head.is_some() {
             return Ok(());
