@@ -22,24 +22,20 @@ impl fmt::Display for Progress<'_> {
         if !self.driving && link.cause() == Cause::NotOrdered {
             let what = if running == all { "waiting" } else { "starting" };
             write!(f, "{what}: {running}/{all} stages alive")?;
-            return write_complaint(f, record);
+        } else {
+            let pose = record.pose.unwrap_or_default();
+            let (time, speed) = (pose.stamp.seconds(), pose.v_m_s);
+            let distance = record.command.map_or(self.straight_m, |command| command.distance_m);
+            let events = record.guidance.back().map_or(0, |guidance| guidance.safety_events);
+            write!(
+                f,
+                "{time:6.1} s  {distance:5.2} m to go  {speed:5.2} m/s  hazards mapped {events:3} times  {running}/{all} stages alive"
+            )?;
+            if link.action() != Action::Go {
+                let (cause, effect) = (link.cause().name().to_uppercase(), link.action().effect());
+                write!(f, ", {cause}: the robot {effect}")?;
+            }
         }
-        let pose = record.pose.unwrap_or_default();
-        let (time, speed) = (pose.stamp.seconds(), pose.v_m_s);
-        let distance = record.command.map_or(self.straight_m, |command| command.distance_m);
-        let events = record.guidance.back().map_or(0, |guidance| guidance.safety_events);
-        write!(
-            f,
-            "{time:6.1} s  {distance:5.2} m to go  {speed:5.2} m/s  hazards mapped {events:3} times  {running}/{all} stages alive"
-        )?;
-        if link.action() != Action::Go {
-            let (cause, effect) = (link.cause().name().to_uppercase(), link.action().effect());
-            write!(f, ", {cause}: the robot {effect}")?;
-        }
-        write_complaint(f, record)
+        record.complaint().map_or(Ok(()), |complaint| write!(f, "; {complaint}"))
     }
-}
-
-fn write_complaint(f: &mut fmt::Formatter<'_>, record: &Record) -> fmt::Result {
-    record.complaint().map_or(Ok(()), |complaint| write!(f, "; {complaint}"))
 }

@@ -29,17 +29,11 @@ pub(crate) enum Next {
     Begin(RecoveryStep),
 }
 
-#[derive(Clone, Copy)]
-struct Step {
-    stall: StallSample,
-    /// Time of the step, and the samples published by then.
-    begun: Option<(Instant, Published)>,
-}
-
 pub(crate) struct RecoverySteps {
     /// Limit of the link; `None` in wall-clock time.
     pub limit: Option<TickLimitSample>,
-    step: Option<Step>,
+    /// Stall, time of its step, and the samples published by then.
+    step: Option<(StallSample, Option<(Instant, Published)>)>,
 }
 
 impl RecoverySteps {
@@ -63,31 +57,31 @@ impl RecoverySteps {
     pub(crate) fn on_stall(&mut self, stall: StallSample) {
         assert!(self.step.is_none());
         self.on_checked(stall.stamp.tick);
-        self.step = Some(Step { stall, begun: None });
+        self.step = Some((stall, None));
     }
 
     /// Returns whether `epoch`, the newest stall's, must be withheld.
     pub(crate) fn withholds(&self, epoch: u64) -> bool {
-        self.step.is_some_and(|step| {
-            let forgets = step.stall.recovery() == RecoveryStep::Reset;
-            forgets && step.stall.epoch == epoch && step.begun.is_none()
+        self.step.is_some_and(|(stall, begun)| {
+            let forgets = stall.recovery() == RecoveryStep::Reset;
+            forgets && stall.epoch == epoch && begun.is_none()
         })
     }
 
     pub(crate) fn next(&mut self, published: Published, now: Instant) -> Next {
-        let Some(step) = &mut self.step else {
+        let Some((stall, begun)) = &mut self.step else {
             return Next::Check;
         };
-        let (stall, begun) = (step.stall, step.begun);
+        let stall = *stall;
         let Some(limit) = &mut self.limit else {
             self.step = None;
             return Next::Begin(stall.recovery());
         };
-        let Some((since, before)) = begun else {
+        let Some((since, before)) = *begun else {
             if published.tick.is_none_or(|tick| tick < stall.stamp.tick + AHEAD) {
                 return Next::Wait;
             }
-            step.begun = Some((now, published));
+            *begun = Some((now, published));
             return Next::Begin(stall.recovery());
         };
         let late = now.saturating_duration_since(since) >= ANSWERED;
