@@ -219,21 +219,13 @@ impl Collector {
 
     /// Returns the rows of newly ended ticks. A sample of the link ends a tick.
     pub fn take_rows(&mut self) -> Vec<Value> {
-        let last = self.link().stamp.tick.min(self.pose_tick);
+        let last = self.state.link.map_or(0, |link| link.stamp.tick).min(self.pose_tick);
         let mut rows = Vec::new();
         while let Some(first) = self.ticks.first_entry().filter(|first| *first.key() <= last) {
             let tick = first.remove();
             rows.extend(self.row(tick));
         }
         rows
-    }
-
-    fn roster(&self) -> RosterHeader {
-        self.state.supervisor.unwrap_or_default()
-    }
-
-    fn link(&self) -> LinkSample {
-        self.state.link.unwrap_or_default()
     }
 
     pub fn take_map(&mut self) -> Option<Vec<u8>> {
@@ -270,8 +262,9 @@ impl Collector {
         }
         let flags = |entry: &RosterEntry| [u64::from(entry.pid), u64::from(entry.state)];
         let mut key: Vec<u64> = self.state.stages.iter().flat_map(flags).collect();
-        let LinkSample { action, cause, connected, at_rest, .. } = self.link();
-        let RosterHeader { order, reason, .. } = self.roster();
+        let LinkSample { action, cause, connected, at_rest, .. } =
+            self.state.link.unwrap_or_default();
+        let RosterHeader { order, reason, .. } = self.state.supervisor.unwrap_or_default();
         let status = self.newest.guidance.map_or(0, |guidance| guidance.status);
         key.extend([action, cause, at_rest, order, reason, status].map(u64::from));
         let target = self.state.target.map_or(0, |sent| sent.number);
@@ -290,7 +283,8 @@ impl Collector {
 
     fn state_json(&self) -> Value {
         let usage = |at: usize| self.usage.get(at).copied().unwrap_or_default();
-        let (roster, (kind, does)) = (self.roster(), self.state.doing());
+        let (roster, (kind, does)) =
+            (self.state.supervisor.unwrap_or_default(), self.state.doing());
         let stages = self.state.stages.iter().enumerate().map(|(at, entry)| {
             json!({
                 "name": name_str(&entry.stage),
