@@ -22,10 +22,6 @@ impl Action {
         row.map_or("", |(_, name, _)| name)
     }
 
-    const fn is_of_a_stage(self) -> bool {
-        !matches!(self, Self::Stop | Self::Resume)
-    }
-
     fn perform(self, robot: &RobotName, stage: &str) -> Result<(), String> {
         let done = match self {
             Self::Kill => operator::send(robot, stage, Signal::KILL),
@@ -120,10 +116,10 @@ impl Operator {
         if self.under_way.is_some() {
             return "the last action is still under way".to_owned();
         }
-        let stage = match stage {
-            _ if !action.is_of_a_stage() => String::new(),
-            Some(stage) => stage.to_owned(),
-            None => return "no stage is known yet".to_owned(),
+        let stage = match (action, stage) {
+            (Action::Stop | Action::Resume, _) => String::new(),
+            (_, Some(stage)) => stage.to_owned(),
+            (_, None) => return "no stage is known yet".to_owned(),
         };
         let asked = format!("{} {stage}", action.name()).trim_end().to_owned();
         let (robot, name) = (self.robot.clone(), asked.clone());

@@ -49,7 +49,9 @@ pub fn draw(view: &View, frame: &mut Frame<'_>) {
     let [map, text] = if is_wide { [right, below] } else { split(below, side) };
     table(view, frame, stages);
     details(view, frame, text);
-    draw_map(view, frame, map);
+    let lines = map::lines(&view.state, map.width, map.height);
+    let lines = lines.unwrap_or_else(|| vec![Line::styled("no map yet", DIM)]);
+    frame.render_widget(Paragraph::new(lines), map);
     let wrapped = Paragraph::new(view.message.as_str()).wrap(Wrap { trim: true });
     frame.render_widget(wrapped, message);
     let keys_line = explained(KEYS.map(|(key, what, _)| (key, TITLE, what)));
@@ -166,12 +168,6 @@ fn cpu(usage: Usage) -> String {
 
 fn memory(usage: Usage) -> String {
     usage.memory_bytes.map_or("-".to_owned(), words::size)
-}
-
-fn draw_map(view: &View, frame: &mut Frame<'_>, area: Rect) {
-    let lines = map::lines(&view.state, area.width, area.height);
-    let map = lines.unwrap_or_else(|| vec![Line::styled("no map yet", DIM)]);
-    frame.render_widget(Paragraph::new(map), area);
 }
 
 fn details(view: &View, frame: &mut Frame<'_>, area: Rect) {
