@@ -80,9 +80,6 @@ const fn code(answer: RequestAnswer) -> &'static str {
     }
 }
 
-/// Reason why the supervisor does not know of a stop, which holds anyway.
-pub type Untold = Option<String>;
-
 const TOLD_WITHIN: Duration = PATIENCE.saturating_add(Duration::from_secs(2));
 
 /// Timeout for a stop; the link changes its method after 1 s.
@@ -96,8 +93,9 @@ const GUARD_STARTS: Duration = Duration::from_millis(20);
 /// Stops the robot and waits until it rests.
 ///
 /// The request reaches the link without the middleware. The supervisor hears it too, so that its
-/// successors keep the stop. If no link answers, a stop guard stops the robot.
-pub fn stand(robot: &RobotName) -> Result<Untold> {
+/// successors keep the stop. If no link answers, a stop guard stops the robot. Returns the reason why
+/// the supervisor does not know of the stop, which holds anyway.
+pub fn stand(robot: &RobotName) -> Result<Option<String>> {
     let asked_ns = monotonic_ns();
     let domain = robot.domain();
     refuse_mirror(&domain)?;
@@ -128,8 +126,7 @@ pub fn stand(robot: &RobotName) -> Result<Untold> {
 
 /// Tells the link to stop the robot, without waiting. [`stand`] does the rest.
 pub fn stop_at_once(robot: &RobotName) {
-    let link = Operator::connect(&robot.domain().stop_socket());
-    if let Ok(Some(link)) = link {
+    if let Ok(Some(link)) = Operator::connect(&robot.domain().stop_socket()) {
         let _ = link.send(Request::Stop);
     }
 }

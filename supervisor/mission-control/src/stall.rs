@@ -109,7 +109,7 @@ pub(crate) struct StallWatch {
     pinned_after: Duration,
     cut_off_after: Duration,
     /// Last motion and place of the robot; `None` before both are known.
-    motion: Option<(Anchor, Place)>,
+    motion: Option<(PoseSample, Place)>,
     cut_off_since: Option<MissionTime>,
     waits_since: Option<MissionTime>,
     inside_hazard_since: Option<f64>,
@@ -136,13 +136,6 @@ pub(crate) struct StallWatch {
     stalls: Vec<StallSample>,
     /// Stalls up to the newest target given up in the run.
     settled: usize,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Anchor {
-    time: MissionTime,
-    travelled: f64,
-    heading: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -303,7 +296,7 @@ impl StallWatch {
         };
         let now = pose.stamp.time();
         if let Some((anchor, place)) = &mut self.motion {
-            (anchor.time, place.since) = (now, now);
+            (anchor.stamp, place.since) = (pose.stamp, now);
         }
         (self.cut_off_since, self.inside_hazard_since) = (None, None);
         self.waits_since = None;
@@ -415,14 +408,13 @@ impl StallWatch {
         guidance: &GuidanceSample,
     ) -> Option<StallCause> {
         let now = pose.stamp.time();
-        let here = Anchor { time: now, travelled: pose.travelled_m, heading: pose.heading_rad };
         let (middle, nearest_m) = (pose.pose().position, guidance.distance_m);
         let arrived = Place { since: now, middle, nearest_m };
-        let (anchor, place) = self.motion.get_or_insert((here, arrived));
-        if (here.travelled - anchor.travelled).abs() >= self.moved_m
-            || (here.heading - anchor.heading).abs() >= self.turned_rad
+        let (anchor, place) = self.motion.get_or_insert((*pose, arrived));
+        if (pose.travelled_m - anchor.travelled_m).abs() >= self.moved_m
+            || (pose.heading_rad - anchor.heading_rad).abs() >= self.turned_rad
         {
-            *anchor = here;
+            *anchor = *pose;
         }
         if middle.distance(place.middle) >= self.place_m {
             *place = arrived;
@@ -435,7 +427,7 @@ impl StallWatch {
         if guidance.status() == GuidanceStatus::Unreachable {
             return None;
         }
-        let still = now.since(anchor.time) >= STALLED_AFTER;
+        let still = now.since(anchor.stamp.time()) >= STALLED_AFTER;
         let pinned = now.since(place.since) >= self.pinned_after;
         match (still, pinned) {
             (true, _) => Some(StallCause::Still),
