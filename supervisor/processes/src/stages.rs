@@ -79,24 +79,20 @@ impl Stage {
     }
 }
 
-/// Time for a stage to open its topics, which incomplete services block. On a loaded machine of two
-/// cores the slowest start took a tenth of it.
-const STARTUP: Duration = Duration::from_secs(3);
-/// Five beats.
-///
-/// A loaded machine with more stages than cores sometimes delays a beat by 200 ms. With 500 ms
-/// during a build, three healthy stages were aborted in 70 missions. The link's stop on a stale
-/// command is independent of this.
-const HEARTBEAT: Duration = Duration::from_millis(750);
-/// Time for an answer; the slowest take a hundredth of it.
-const ANSWERS: Duration = Duration::from_secs(1);
-const DEADLINES: Deadlines = Deadlines { startup: STARTUP, heartbeat: HEARTBEAT, answers: ANSWERS };
-/// The planner beats between solves, and leaves ticks unanswered while it solves.
-const PLANNER_DEADLINES: Deadlines = Deadlines {
-    startup: STARTUP,
-    heartbeat: Duration::from_secs(2),
-    answers: Duration::from_secs(4),
+const DEADLINES: Deadlines = Deadlines {
+    // Time for a stage to open its topics, which incomplete services block. On a loaded machine of
+    // two cores the slowest start took a tenth of it.
+    startup: Duration::from_secs(3),
+    // Five beats. A loaded machine with more stages than cores sometimes delays a beat by 200 ms.
+    // With 500 ms during a build, three healthy stages were aborted in 70 missions. The link's stop
+    // on a stale command is independent of this.
+    heartbeat: Duration::from_millis(750),
+    // The slowest answers take a hundredth of it.
+    answers: Duration::from_secs(1),
 };
+/// The planner beats between solves, and leaves ticks unanswered while it solves.
+const PLANNER_DEADLINES: Deadlines =
+    Deadlines { heartbeat: Duration::from_secs(2), answers: Duration::from_secs(4), ..DEADLINES };
 /// The mapper restores and publishes its whole map in one iteration. At 16.8 million cells no beat
 /// was late even without this.
 const MAPPER_MILLION_CELLS: Duration = Duration::from_millis(100);
