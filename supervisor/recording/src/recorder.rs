@@ -149,7 +149,8 @@ pub fn record(
             Event::Samples(_) | Event::Nothing => {}
         }
         // A bus exists before its run.
-        if joins && let Some(run) = find_run(options) {
+        let linked = || fs::read_link(options.domain.run_directory()).ok();
+        if joins && let Some(run) = options.run.clone().or_else(linked) {
             joins = false;
             let holder = options.domain.supervisor().ok().flatten();
             if options.run.is_some() && supervisor.is_some() && supervisor != holder {
@@ -269,11 +270,6 @@ fn give_way(run: Option<&Run>) {
         // Otherwise the recorder competes with the stages.
         let _ = rustix::process::setpriority_process(None, NICE);
     }
-}
-
-fn find_run(options: &Options) -> Option<PathBuf> {
-    let link = options.domain.run_directory();
-    options.run.clone().or_else(|| fs::read_link(link).ok())
 }
 
 struct CurrentRun {
