@@ -128,13 +128,11 @@ impl Collector {
     fn ranges(&mut self, tick: u64, readings: &[RangeReading]) {
         let mut ranges = vec![None; self.newest.ranges.as_ref().map_or(0, Vec::len)];
         for reading in readings {
-            let Some(range) = ranges.get_mut(usize::from(reading.sensor)) else {
-                continue;
-            };
-            *range = match reading.status() {
-                RangeStatus::Measured | RangeStatus::AtContact => Some(reading.range_m),
-                RangeStatus::Absent | RangeStatus::Nothing | RangeStatus::Invalid => None,
-            };
+            if let Some(range) = ranges.get_mut(usize::from(reading.sensor)) {
+                let is_seen =
+                    matches!(reading.status(), RangeStatus::Measured | RangeStatus::AtContact);
+                *range = is_seen.then_some(reading.range_m);
+            }
         }
         self.tick(tick).ranges = Some(ranges);
     }

@@ -6,8 +6,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use common::ground_truth::GROUND_TRUTH;
 use common::{
+    ground_truth::GROUND_TRUTH,
     mission::{Mission, SensorKind},
     samples::RangeReading,
 };

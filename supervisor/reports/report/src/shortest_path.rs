@@ -136,7 +136,7 @@ impl Grid {
         while at + 1 < points.len() {
             let farthest = (at + 1..points.len())
                 .rev()
-                .find(|&next| next == at + 1 || self.sees(points[at], points[next]))
+                .find(|&next| self.sees(points[at], points[next]))
                 .unwrap_or(at + 1);
             length += points[at].distance(points[farthest]);
             at = farthest;

@@ -7,12 +7,12 @@ use std::{
 };
 
 use axum::body::Bytes;
-use common::ground_truth::GROUND_TRUTH;
 use common::{
     bus::Bus,
     clock::{MissionClock, monotonic_ns},
     domain::Domain,
     follower::{Event, Follower},
+    ground_truth::GROUND_TRUTH,
     process_usage::Processes,
     samples::Cause,
     topics,
