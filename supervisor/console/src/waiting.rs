@@ -20,7 +20,7 @@ impl Waiting {
                 self.report(robot, ENDED);
             }
             Event::Nothing if !self.connected => self.report(robot, NOT_RUNNING),
-            Event::Nothing | Event::Samples(_) => {}
+            _ => {}
         }
     }
 

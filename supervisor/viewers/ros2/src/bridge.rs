@@ -382,10 +382,7 @@ impl Bridge<'_> {
             Order::Stand { is_cancel: true } => {
                 self.server.abort("the robot did not stop after the cancellation");
             }
-            Order::Stand { is_cancel: false }
-            | Order::Resume
-            | Order::Place(..)
-            | Order::Hand(..) => {}
+            _ => {}
         }
     }
 
@@ -408,7 +405,8 @@ impl Bridge<'_> {
         shown.tick(now_ns, &mut |id, payload| node.publish(id, payload));
         if self.feedback_at.elapsed() >= FEEDBACK_EVERY {
             self.feedback_at = Instant::now();
-            let feedback = server.feedback(&shown.newest_pose(), shown.state.stalls, now_ns);
+            let feedback =
+                server.feedback(&shown.state.pose.unwrap_or_default(), shown.state.stalls, now_ns);
             if let Some(feedback) = feedback {
                 node.publish_feedback(0, feedback);
             }

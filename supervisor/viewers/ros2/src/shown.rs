@@ -96,10 +96,6 @@ impl Shown {
         sink(Id::TfStatic, transforms(now_ns, &mounts.collect::<Vec<_>>()));
     }
 
-    pub fn newest_pose(&self) -> PoseSample {
-        self.state.pose.unwrap_or_default()
-    }
-
     pub fn sample(&mut self, sample: &Sample, now_ns: u64, sink: Sink<'_>) {
         if !self.state.apply(sample) {
             return;
@@ -247,7 +243,8 @@ impl Shown {
         };
         let to = DVec2::new(header.target_x_m, header.target_y_m);
         let header = Header::at(now_ns, MAP);
-        let (cells, from) = (self.state.field.cells(), self.newest_pose().pose().position);
+        let from = self.state.pose.unwrap_or_default().pose().position;
+        let cells = self.state.field.cells();
         sink(Id::Path, path(header.clone(), &way(frame, cells, from, to)).encode());
         let drawn = [vec![directions(frame, cells)], self.targets()].concat();
         sink(Id::Field, markers(&header, drawn));
