@@ -27,15 +27,12 @@ impl BelievedHazard {
                 (ink::KNOWN, "known beforehand", blocks.area(CellState::Known)),
                 (ink::SENSED, "sensed, with margin", blocks.area(CellState::Sensed)),
             ]);
-            if hazard.len() <= BUDGET || block >= lattice.longest() {
+            let length: usize = hazard.0.iter().map(|(.., area)| area.len()).sum();
+            if length <= BUDGET || block >= lattice.longest() {
                 return hazard;
             }
             block *= 2;
         }
-    }
-
-    fn len(&self) -> usize {
-        self.0.iter().map(|(.., area)| area.len()).sum()
     }
 
     pub(super) fn layer(&self) -> String {

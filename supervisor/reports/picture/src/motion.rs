@@ -58,7 +58,6 @@ impl<'a> Motion<'a> {
     }
 
     pub(super) fn layer(&self, view: &View) -> String {
-        let radius = view.px(self.scene.mission.body().radius_m);
         let start = self.scene.mission.start_pose();
         let ring = view.px(self.scene.mission.arrival_tolerance_m);
         let mut targets = self.scene.targets.to_vec();
@@ -67,36 +66,38 @@ impl<'a> Motion<'a> {
         }
         let [truth, believed] =
             [self.scene.truth, self.scene.believed].map(|poses| trajectory(view, poses));
+        let believed_last = self.scene.believed.last().filter(|_| self.has_truth());
         [
             targets.into_iter().map(|at| target(view.place(at), ring)).collect(),
             halo(&truth),
             halo(&believed),
-            self.bodies(view, radius),
+            self.bodies(view, self.instants().map(|(_, pose)| pose), BODY),
             truth.element(&truth_line()),
             believed.element(&believed_line()),
             start_mark(view.place(start.position)),
-            self.end(view, radius),
+            self.bodies(view, self.way.last(), &final_body()),
+            self.bodies(view, believed_last, &believed_end()),
             self.region(view),
         ]
         .concat()
     }
 
-    fn bodies(&self, view: &View, radius: f64) -> String {
+    fn bodies<'p>(
+        &self,
+        view: &View,
+        poses: impl IntoIterator<Item = &'p Pose2>,
+        style: &str,
+    ) -> String {
+        let body = self.scene.mission.body();
+        let radius = view.px(body.radius_m);
         let mut outlines = Path::default();
-        for (_, pose) in self.instants() {
-            self.add_outline(&mut outlines, view, radius, pose);
+        for pose in poses.into_iter().filter(|pose| is_shown(view, pose)) {
+            add_body(&mut outlines, view.place(pose.position), radius, pose.heading);
+            if let Some(footprint) = &body.footprint {
+                outlines.polygon(footprint.corners_at(*pose).map(|corner| view.place(corner)));
+            }
         }
-        outlines.element(BODY)
-    }
-
-    fn add_outline(&self, path: &mut Path, view: &View, radius: f64, pose: &Pose2) {
-        if !is_shown(view, pose) {
-            return;
-        }
-        add_body(path, view.place(pose.position), radius, pose.heading);
-        if let Some(footprint) = self.scene.mission.body().footprint {
-            path.polygon(footprint.corners_at(*pose).map(|corner| view.place(corner)));
-        }
+        outlines.element(style)
     }
 
     /// Draws the 95 % ellipse of the robot's centre.
@@ -122,18 +123,6 @@ impl<'a> Motion<'a> {
             Px(at.y),
             region_style()
         )
-    }
-
-    fn end(&self, view: &View, radius: f64) -> String {
-        let body = |pose: Option<&Pose2>, style: &str| {
-            let mut path = Path::default();
-            if let Some(pose) = pose {
-                self.add_outline(&mut path, view, radius, pose);
-            }
-            path.element(style)
-        };
-        let believed = self.scene.believed.last().filter(|_| self.has_truth());
-        body(self.way.last(), &final_body()) + &body(believed, &believed_end())
     }
 }
 

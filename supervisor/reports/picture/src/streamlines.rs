@@ -43,22 +43,17 @@ pub(super) fn layer(lattice: &Lattice, cells: &[FieldCell], style: &Style) -> St
     let cell = lattice.width / lattice.cols.max(1) as f64;
     let mut spacing = style.spacing.max(style.least_cells * cell);
     loop {
-        let (lines, arrowheads) = drawn(lattice, cells, style.spacing, spacing);
+        let (mut lines, mut arrowheads) = (Path::default(), Path::default());
+        for line in evenly_spaced(lattice, cells, spacing) {
+            let on_sheet: Vec<DVec2> = line.iter().map(|&at| lattice.place(at)).collect();
+            draw(&on_sheet, style.spacing, &mut lines, &mut arrowheads);
+        }
         let whole = lattice.width.max(lattice.height);
         if lines.len() + arrowheads.len() <= style.budget || spacing > whole {
             return paint(&lines, &arrowheads, style);
         }
         spacing *= 1.5;
     }
-}
-
-fn drawn(lattice: &Lattice, cells: &[FieldCell], usual: f64, spacing: f64) -> (Path, Path) {
-    let (mut lines, mut arrowheads) = (Path::default(), Path::default());
-    for line in evenly_spaced(lattice, cells, spacing) {
-        let on_sheet: Vec<DVec2> = line.iter().map(|&at| lattice.place(at)).collect();
-        draw(&on_sheet, usual, &mut lines, &mut arrowheads);
-    }
-    (lines, arrowheads)
 }
 
 fn paint(lines: &Path, arrowheads: &Path, style: &Style) -> String {
