@@ -34,9 +34,13 @@ pub trait Watched {
 
     /// Returns the times that the process ran and starved; `None` if it has ended or is not
     /// counted.
-    fn times(&self) -> Option<Times>;
+    fn times(&self) -> Option<Times> {
+        Times::of(self.id())
+    }
 
-    fn activity(&self, then: Times) -> Option<Activity>;
+    fn activity(&self, then: Times) -> Option<Activity> {
+        then.activity(self.id())
+    }
 
     /// Returns the end of what the process has logged, in whole lines.
     fn log_tail(&self) -> String {
@@ -119,14 +123,6 @@ impl Watched for SystemProcess {
 
     fn descriptor(&self) -> Option<BorrowedFd<'_>> {
         Some(self.process.as_fd())
-    }
-
-    fn times(&self) -> Option<Times> {
-        Times::of(self.id())
-    }
-
-    fn activity(&self, then: Times) -> Option<Activity> {
-        then.activity(self.id())
     }
 
     fn log_tail(&self) -> String {
