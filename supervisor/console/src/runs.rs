@@ -172,7 +172,12 @@ pub fn numbered(runs: &Path, name: &str) -> Result<PathBuf> {
     fs::create_dir_all(runs).map_err(|error| {
         format!("cannot make {}: {error}; name another directory with --out", runs.display())
     })?;
-    let mut number = highest_number(runs, name) + 1;
+    let number = |entry: fs::DirEntry| {
+        let file_name = entry.file_name();
+        let rest = file_name.to_str()?.strip_prefix(name)?;
+        rest.strip_prefix('-')?.parse::<u64>().ok()
+    };
+    let mut number = entries(runs).filter_map(number).max().unwrap_or_default() + 1;
     loop {
         let directory = runs.join(format!("{name}-{number:03}"));
         match fs::create_dir(&directory) {
@@ -183,15 +188,6 @@ pub fn numbered(runs: &Path, name: &str) -> Result<PathBuf> {
             }
         }
     }
-}
-
-fn highest_number(runs: &Path, name: &str) -> u64 {
-    let number = |entry: fs::DirEntry| {
-        let file_name = entry.file_name();
-        let rest = file_name.to_str()?.strip_prefix(name)?;
-        rest.strip_prefix('-')?.parse().ok()
-    };
-    entries(runs).filter_map(number).max().unwrap_or_default()
 }
 
 /// Removes all but the newest `keep` ended runs of `robot`; ignores failures.

@@ -185,11 +185,8 @@ impl StallWatch {
 
     /// Returns the replans and resets up to `tick`, or of the whole mission.
     pub(crate) fn recoveries(&self, tick: Option<u64>) -> (u32, u64) {
-        let Some(tick) = tick else {
-            return (self.replans, self.resets());
-        };
-        let after = self.stalls.iter().find(|stall| stall.stamp.tick > tick);
-        after.map_or((self.replans, self.resets()), |stall| match stall.recovery() {
+        let after = |tick: u64| self.stalls.iter().find(|stall| stall.stamp.tick > tick);
+        tick.and_then(after).map_or((self.replans, self.resets()), |stall| match stall.recovery() {
             RecoveryStep::Replan => (stall.replans - 1, stall.resets),
             RecoveryStep::Reset => (stall.replans, stall.resets - 1),
             RecoveryStep::GiveUp => (stall.replans, stall.resets),

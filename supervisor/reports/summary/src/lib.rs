@@ -262,8 +262,7 @@ fn straight_m(mission: &Mission, targets: &[TargetResult]) -> f64 {
 
 /// Uses square roots, identical on every processor, unlike the C library's `hypot`.
 pub fn path_length(truth: &[GroundTruthTick]) -> f64 {
-    let legs = truth.windows(2).map(|pair| [0, 1].map(|at| pair[at].pose().position));
-    legs.map(|[from, to]| from.distance(to)).sum()
+    truth.windows(2).map(|pair| pair[0].pose().position.distance(pair[1].pose().position)).sum()
 }
 
 fn contact_speed_m_s(truth: &[GroundTruthTick], track_m: f64) -> Option<f64> {

@@ -55,10 +55,6 @@ impl ScreenFeed {
         if has_roster {
             view.usage = self.processes.look(&view.state.processes(), Instant::now());
         }
-        self.count(view)
-    }
-
-    fn count(&mut self, view: &mut View) -> Result<(), BusError> {
         let now = Instant::now();
         let due = now.saturating_duration_since(self.counted) >= COUNT_FOR;
         for Output { stage, reader, rates } in &mut self.outputs {
