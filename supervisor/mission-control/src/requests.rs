@@ -28,11 +28,11 @@ const HAND_AHEAD_M: f64 = 0.3;
 
 impl Supervisor<'_> {
     /// Returns whether there was a request.
-    pub(crate) fn take_requests(&mut self, first_tick: u64) -> Result<bool> {
+    pub(crate) fn take_requests(&mut self) -> Result<bool> {
         let mut asked = false;
         while let Some(request) = self.bus.requests.next_sample()? {
             asked = true;
-            let answer = self.carry_out_request(&request, first_tick);
+            let answer = self.carry_out_request(&request);
             let (kind, reason) = (request.kind(), answer.text());
             if answer != RequestAnswer::Taken {
                 tracing::warn!(?kind, reason, "an operator's request is refused");
@@ -47,7 +47,7 @@ impl Supervisor<'_> {
         Ok(asked)
     }
 
-    fn carry_out_request(&mut self, request: &RequestSample, first_tick: u64) -> RequestAnswer {
+    fn carry_out_request(&mut self, request: &RequestSample) -> RequestAnswer {
         match request.kind() {
             // A run that ends takes only stops.
             kind if kind != RequestKind::Stop && self.decision == Decision::ENDING => {
@@ -57,7 +57,7 @@ impl Supervisor<'_> {
             RequestKind::Restart => {
                 let stage = name_str(&request.stage);
                 tracing::warn!(stage, "an operator asks for a new generation");
-                self.stages.replace(stage, first_tick);
+                self.stages.replace(stage, self.first_tick());
             }
             // This stop came late: the link obeyed at once, and an operator has resumed since.
             RequestKind::Stop if request.asked_ns < self.resumed_ns => {
@@ -74,12 +74,12 @@ impl Supervisor<'_> {
                 self.resumed_ns = request.asked_ns.min(monotonic_ns());
             }
             kind @ (RequestKind::Goto | RequestKind::Append) => {
-                return self.send_robot(request, kind == RequestKind::Append, first_tick);
+                return self.send_robot(request, kind == RequestKind::Append);
             }
             RequestKind::Place => return self.place_robot(request),
             RequestKind::Follow => return self.follow(request),
             RequestKind::EndFollow => return self.end_follow(),
-            RequestKind::Hand => return self.drive_by_hand(request, first_tick),
+            RequestKind::Hand => return self.drive_by_hand(request),
             kind @ (RequestKind::AddZone | RequestKind::RemoveZone) => {
                 return self.change_zones(request, kind == RequestKind::AddZone);
             }
@@ -143,12 +143,7 @@ impl Supervisor<'_> {
         RequestAnswer::Taken
     }
 
-    fn send_robot(
-        &mut self,
-        request: &RequestSample,
-        appends: bool,
-        first_tick: u64,
-    ) -> RequestAnswer {
+    fn send_robot(&mut self, request: &RequestSample, appends: bool) -> RequestAnswer {
         let record = &self.record;
         let mission = &self.options.mission;
         let points = request.targets();
@@ -162,24 +157,24 @@ impl Supervisor<'_> {
                 false => RequestAnswer::TooMany,
             };
         }
-        self.replace_targets(points, first_tick);
+        self.replace_targets(points);
         self.log_target();
         RequestAnswer::Taken
     }
 
-    fn replace_targets(&mut self, points: &[TargetPoint], first_tick: u64) {
+    fn replace_targets(&mut self, points: &[TargetPoint]) {
         self.end_following(TargetOutcome::Followed);
         // In lockstep no tick begins while the robot waits.
         let waits = self.decision.reason == HoldReason::Waiting;
         let limit = self.recovery_steps.limit.filter(|_| !waits);
-        let since_tick = limit.map_or(first_tick, |limit| limit.last_tick + 1);
+        let since_tick = limit.map_or_else(|| self.first_tick(), |limit| limit.last_tick + 1);
         let arrival = self.record.sure_arrival(&self.options.mission);
         self.targets.replace(points, (since_tick, self.pose_time().seconds()), arrival);
         self.on_new_target();
     }
 
     /// Moves the target ahead over free ground.
-    fn drive_by_hand(&mut self, request: &RequestSample, first_tick: u64) -> RequestAnswer {
+    fn drive_by_hand(&mut self, request: &RequestSample) -> RequestAnswer {
         let mission = &self.options.mission;
         if !mission.stay {
             return RequestAnswer::NotStaying;
@@ -200,7 +195,7 @@ impl Supervisor<'_> {
         if let Some(answer) = target_list::refusal(Some(&point), self.why_held(), mission, record) {
             return answer;
         }
-        self.replace_targets(&point, first_tick);
+        self.replace_targets(&point);
         self.targets.by_hand = true;
         self.hand_until = Some(Instant::now() + DEAD_MAN);
         RequestAnswer::Taken

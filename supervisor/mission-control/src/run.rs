@@ -52,7 +52,7 @@ impl StillMoving<'_> {
         let supervisor = &mut self.supervisor;
         let did = loop {
             supervisor.wait_turn()?;
-            supervisor.take_requests(supervisor.first_tick())?;
+            supervisor.take_requests()?;
             match supervisor.wheels() {
                 Wheels::AtRest => break "rests",
                 wheels if self.signals.came() => {

@@ -145,7 +145,7 @@ impl Supervisor<'_> {
     pub(crate) fn wait_turn(&mut self) -> Result {
         self.service.feed();
         self.bus.observer.read_all(&mut self.record, &mut self.stages, &mut self.listener)?;
-        self.poll_processes(self.first_tick())?;
+        self.poll_processes()?;
         // A full pipe would block the simulated robot, and its answers to the link.
         self.robot.poll()?;
         if self.bus.is_due() {

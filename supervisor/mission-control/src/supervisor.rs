@@ -214,7 +214,15 @@ impl<'a> Supervisor<'a> {
             }
             if self.bus.is_due() {
                 self.publish_state()?;
-                self.show_progress(show);
+                let target = self.targets.current.position();
+                let progress = Progress {
+                    record: &self.record,
+                    running: self.stages.running(),
+                    driving: self.decision.order() == Order::Drive,
+                    straight_m: target.distance(self.options.mission.start.at),
+                };
+                show(&progress);
+                self.service.show(|| progress.to_string());
                 surroundings.restore();
             }
             let any_starting = self.stages.any_starting();
@@ -228,16 +236,15 @@ impl<'a> Supervisor<'a> {
         let roster_changed =
             self.bus.observer.read_all(&mut self.record, &mut self.stages, &mut self.listener)?;
         let next = self.take_arrival() | self.miss_hand() | self.take_beacon()?;
-        let first_tick = self.first_tick();
-        let asked = self.take_requests(first_tick)?;
-        let died = self.poll_processes(first_tick)?;
+        let asked = self.take_requests()?;
+        let died = self.poll_processes()?;
         // Without frames, no later tick brings what a stage has missed of the newest one.
         let frames_come = self
             .record
             .link
             .is_some_and(|link| !matches!(link.cause(), Cause::RobotLost | Cause::FramesSilent));
         let driving = self.decision.order() == Order::Drive && frames_come;
-        self.stages.check_outputs(driving, first_tick);
+        self.stages.check_outputs(driving, self.first_tick());
         let simulator_ended = !self.robot.poll()?;
         if self.decide_order() || roster_changed || died || asked || next {
             self.publish_state()?;
@@ -257,8 +264,8 @@ impl<'a> Supervisor<'a> {
     }
 
     /// Reaps and restarts stages, and reports deaths. Returns whether there were any.
-    pub(crate) fn poll_processes(&mut self, first_tick: u64) -> Result<bool> {
-        let deaths = self.stages.poll(&self.bus.bus, first_tick)?;
+    pub(crate) fn poll_processes(&mut self) -> Result<bool> {
+        let deaths = self.stages.poll(&self.bus.bus, self.first_tick())?;
         let stamp = self.record.pose.unwrap_or_default().stamp;
         for death in &deaths {
             death.log();
@@ -434,17 +441,6 @@ impl<'a> Supervisor<'a> {
         assert_eq!(entries.len(), stages::TABLE.len());
         self.bus.directive.publish(tick, time, directive)?;
         Ok(self.bus.roster.publish_slice(tick, time, header, &entries)?)
-    }
-
-    fn show_progress(&mut self, show: &mut dyn FnMut(&Progress<'_>)) {
-        let progress = Progress {
-            record: &self.record,
-            running: self.stages.running(),
-            driving: self.decision.order() == Order::Drive,
-            straight_m: self.targets.current.position().distance(self.options.mission.start.at),
-        };
-        show(&progress);
-        self.service.show(|| progress.to_string());
     }
 
     pub(crate) fn wait(&mut self) -> Result {
