@@ -8,9 +8,7 @@ use crate::{
 };
 use common::{
     clock::MissionTime,
-    samples::{
-        BeaconRefusal, BeaconSample, FollowState, FollowingSample, RequestAnswer, RequestSample,
-    },
+    samples::{BeaconSample, FollowState, FollowingSample, RequestAnswer, RequestSample},
 };
 
 /// State of the beacon beside the saved [`Following`].
@@ -126,7 +124,13 @@ impl Supervisor<'_> {
             self.beacon.last_tick = self.beacon.last_tick.max(captured.min(pose.stamp.tick) + 1);
         }
         if let Err(refusal) = taken {
-            self.log_refusal(refusal, beacon);
+            let BeaconSample { x_m, y_m, deviation_m, .. } = *beacon;
+            // A source may send thousands, so a repeated reason is logged once.
+            if self.beacon.told.is_none_or(|told| told.refusal != u8::from(refusal)) {
+                let why = refusal.words();
+                tracing::warn!(x_m, y_m, deviation_m, "a beacon sample is refused: {why}");
+            }
+            self.tell_following();
             return false;
         }
         if was_lost {
@@ -145,16 +149,6 @@ impl Supervisor<'_> {
         self.targets.move_to(place, self.first_tick());
         self.on_new_target();
         true
-    }
-
-    fn log_refusal(&mut self, refusal: BeaconRefusal, beacon: &BeaconSample) {
-        let BeaconSample { x_m, y_m, deviation_m, .. } = *beacon;
-        // A source may send thousands, so a repeated reason is logged once.
-        if self.beacon.told.is_none_or(|told| told.refusal != u8::from(refusal)) {
-            let why = refusal.words();
-            tracing::warn!(x_m, y_m, deviation_m, "a beacon sample is refused: {why}");
-        }
-        self.tell_following();
     }
 
     fn tell_following(&mut self) {

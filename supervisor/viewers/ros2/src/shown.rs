@@ -115,15 +115,18 @@ impl Shown {
 
     fn pose(&mut self, sample: &PoseSample, now_ns: u64, sink: Sink<'_>) {
         let pose = plane(sample.pose());
-        let origin = sample.map_from_odom;
         let odom = plane(sample.odometry());
         match self.others_odom {
             None => {
-                let frames = [(MAP, ODOM, origin), (ODOM, BASE, odom)];
+                let frames = [(MAP, ODOM, sample.map_from_odom), (ODOM, BASE, odom)];
                 sink(Id::Tf, transforms(now_ns, &frames));
             }
             Some(Some(robot)) => {
-                let origin = origin_of(robot, sample.pose());
+                let Pose2 { position, heading } = sample.pose();
+                let pose = DAffine2::from_angle_translation(heading, position);
+                let origin = pose * robot.inverse();
+                let [x, y] = origin.translation.to_array();
+                let origin = [x, y, origin.matrix2.x_axis.to_angle()];
                 sink(Id::Tf, transforms(now_ns, &[(MAP, ODOM, origin)]));
             }
             Some(None) => {}
@@ -377,14 +380,6 @@ fn occupancy(cell: u8) -> i8 {
 
 pub const fn plane(Pose2 { position, heading }: Pose2) -> Pose {
     [position.x, position.y, heading]
-}
-
-/// Returns the frame in which `robot` has the pose `pose`.
-fn origin_of(robot: DAffine2, pose: Pose2) -> Pose {
-    let pose = DAffine2::from_angle_translation(pose.heading, pose.position);
-    let origin = pose * robot.inverse();
-    let [x, y] = origin.translation.to_array();
-    [x, y, origin.matrix2.x_axis.to_angle()]
 }
 
 /// Follows the directions of `cells` from `from` to `to`, in steps of half a cell. Ends where there

@@ -34,7 +34,10 @@ pub fn markdown(name: &str, text: &str) -> String {
     let header = reader.headers().cloned().unwrap_or_default();
     let header = match name {
         "capabilities" | "versions" | "figures" => String::new(),
-        _ => table_header(&header.iter().skip(1).collect::<Vec<_>>()),
+        _ => {
+            let columns: Vec<_> = header.iter().skip(1).collect();
+            format!("| {} |\n|{}\n", columns.join(" | "), "---|".repeat(columns.len()))
+        }
     };
     let records = reader.records().flatten();
     let rows = records.map(|row| line(name, &row.iter().skip(1).collect::<Vec<_>>()));
@@ -44,10 +47,6 @@ pub fn markdown(name: &str, text: &str) -> String {
 pub fn results() -> String {
     let printed = RESULTS.iter().map(|(name, text)| format!("{name}\n\n{}", markdown(name, text)));
     printed.collect::<Vec<_>>().join("\n")
-}
-
-fn table_header(columns: &[&str]) -> String {
-    format!("| {} |\n|{}\n", columns.join(" | "), "---|".repeat(columns.len()))
 }
 
 /// Returns an item of a list, or a row of a table.
