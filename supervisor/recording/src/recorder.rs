@@ -172,7 +172,7 @@ pub fn record(
                 None => {
                     files += 1;
                     let file = numbered(&options.out, files);
-                    current = Some(CurrentRun::begin(options, &chosen, &file, run)?);
+                    current = Some(CurrentRun::begin(options, &file, run)?);
                 }
             }
             if let Some(current) = &current {
@@ -251,8 +251,7 @@ impl Tape {
     pub fn take(&mut self) -> Result {
         let directory = self.options.run.clone().unwrap_or_default();
         if self.current.is_none() && file::exists(&directory.join(run::FILE_NAME)) {
-            let (topics, out) = (self.options.sorted_topics(), &self.options.out);
-            self.current = Some(CurrentRun::begin(&self.options, &topics, out, directory)?);
+            self.current = Some(CurrentRun::begin(&self.options, &self.options.out, directory)?);
         }
         self.current.as_mut().map_or(Ok(()), |current| current.take(&mut self.readers))
     }
@@ -287,12 +286,7 @@ struct CurrentRun {
 }
 
 impl CurrentRun {
-    fn begin(
-        options: &Options,
-        topics: &[&'static dyn AnyTopic],
-        path: &Path,
-        directory: PathBuf,
-    ) -> Result<Self> {
+    fn begin(options: &Options, path: &Path, directory: PathBuf) -> Result<Self> {
         let text = file::text(&directory.join(run::FILE_NAME), LONGEST_RUN_FILE);
         let run: Option<Run> = text.as_ref().and_then(|text| toml::from_str(text).ok());
         let about = [
@@ -307,7 +301,8 @@ impl CurrentRun {
             about.insert("mission".to_owned(), run.mission.name.clone());
             about.insert("seed".to_owned(), run.mission.seed.to_string());
         }
-        let file = RecordingFile::create(path, topics, run.as_ref(), about.clone())?;
+        let topics = options.sorted_topics();
+        let file = RecordingFile::create(path, &topics, run.as_ref(), about.clone())?;
         let whole = options.run.is_some();
         let logs = LogFiles::follow(&directory, whole);
         Ok(Self {
