@@ -69,8 +69,7 @@ pub(crate) fn arrived(distance_m: f64, beside: Option<DVec2>) -> Ending {
 }
 
 pub(crate) fn touched([x, y]: [f64; 2]) -> Ending {
-    let reason = format!("touched something near ({x:.2}, {y:.2})");
-    Ending::failed(Outcome::Collision, reason)
+    Ending::failed(Outcome::Collision, format!("touched something near ({x:.2}, {y:.2})"))
 }
 
 /// Operators' stops do not count.

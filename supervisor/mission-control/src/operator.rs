@@ -189,8 +189,7 @@ pub fn sign_off(robot: &RobotName) -> Result {
     let domain = robot.domain();
     let failed = system("sign the robot off");
     if domain.is_supervised() {
-        let message = format!("robot {robot} has a run; end it first");
-        return refuse("running", message);
+        return refuse("running", format!("robot {robot} has a run; end it first"));
     }
     if let Some(guard) = Operator::connect(&domain.guard_socket()).map_err(failed)? {
         return guard.send(Request::SignOff).map_err(failed);

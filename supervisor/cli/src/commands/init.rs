@@ -60,8 +60,7 @@ fn protocol(word: &str) -> Result<Protocol, ValueError> {
 pub fn main(Arguments { address, out, protocol, robot }: &Arguments) -> Result {
     let place = out.display();
     if out.exists() {
-        let message = format!("{place} exists; give another file with --out");
-        return refuse("file-exists", message);
+        return refuse("file-exists", format!("{place} exists; give another file with --out"));
     }
     let seen = match (protocol, address) {
         (Some(protocol), _) => Seen::new(*protocol)?,

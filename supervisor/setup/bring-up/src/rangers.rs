@@ -215,11 +215,10 @@ pub(crate) fn findings(
                 Some(Finding::right("way", text))
             }
             Some(_) => None,
-            None => {
-                let text =
-                    "its drive was not measured; place it 0.8 to 2 m in front of a wall, facing it";
-                Some(Finding::unknown("way", text))
-            }
+            None => Some(Finding::unknown(
+                "way",
+                "its drive was not measured; place it 0.8 to 2 m in front of a wall, facing it",
+            )),
         });
         if moves.turns_back.is_none() {
             let text = "the sonars cannot tell which way it turned; check that its first turn is to the left";
