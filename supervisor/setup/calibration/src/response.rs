@@ -38,16 +38,6 @@ pub enum By {
     Headings,
 }
 
-impl By {
-    /// Returns the loss of explained share that counts as none.
-    const fn as_much(self) -> f64 {
-        match self {
-            Self::Turns => 1e-3,
-            Self::Headings => 1e-4,
-        }
-    }
-}
-
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
     pub value: f64,
@@ -152,7 +142,9 @@ impl Fit {
             let mut simple = simple.filter_map(|acceleration| {
                 delays.clone().filter_map(|step| fit(at(step), acceleration)).max_by(better)
             });
-            let as_much = |it: &Self| it.explained >= limited.explained - by.as_much();
+            // Loss of explained share that counts as none.
+            let loss = if by == By::Turns { 1e-3 } else { 1e-4 };
+            let as_much = |it: &Self| it.explained >= limited.explained - loss;
             Some(simple.find(as_much).unwrap_or(limited))
         };
         const { assert!(4.0 * DELAY_STEP_S >= COARSE_S && COARSE_S < LONGEST_DELAY_S) };
