@@ -79,30 +79,30 @@ impl FaultInjector {
     }
 
     fn lie_of(&mut self, fault: RobotFault) -> Option<Lie> {
-        use RobotFault as F;
-        let wheel = Stream::Wheel(self.channel);
+        use Change::*;
+        use RobotFault::*;
+        use Stream::*;
+        let wheel = Wheel(self.channel);
         let (stream, change) = match fault {
-            F::EncoderDead => (wheel, Change::Scaled(0.0)),
-            F::EncoderReversed => (wheel, Change::Scaled(-1.0)),
-            F::EncoderLow => (wheel, Change::Scaled(self.drawn(LOW))),
-            F::EncoderLower => (wheel, Change::Scaled(self.drawn(LOWER))),
-            F::EncoderRuns => (wheel, Change::Drifts(self.drawn(RUNS_COUNTS_S) * COUNT_RAD)),
-            F::CountsJump => (wheel, Change::Jumps(JUMPS_RAD_S)),
-            F::GyroStops => (Stream::Gyro, Change::Stuck),
-            F::GyroDrifts => (Stream::Gyro, Change::Drifts(self.drawn(DRIFTS_DEG_S).to_radians())),
-            F::GyroSaturates => {
-                (Stream::Gyro, Change::Capped(self.drawn(SATURATES_DEG_S).to_radians()))
-            }
-            F::RangeInvalid => (Stream::AllRanges, Change::Wild(1.0, [NO_READING; 2])),
-            F::RangeStuck => (Stream::AllRanges, Change::Wild(1.0, [self.words.stuck_m(); 2])),
-            F::RangeFrozen => (Stream::AllRanges, Change::Stuck),
-            F::RangeNear => (Stream::AllRanges, Change::Near(self.drawn(NEAR_M))),
-            F::RangeRandom => (Stream::AllRanges, Change::Wild(1.0, RANDOM_M)),
-            F::RangeSilent | F::RangeDeaf => (Stream::AllRanges, Change::Deaf(1.0)),
-            F::SonarsDeaf => (Stream::HalfOfRanges(self.channel), Change::Deaf(1.0)),
-            F::FrontStuck => (Stream::Range(0), Change::Stuck),
-            F::FrontWide => (Stream::Range(0), Change::Wild(1.0, WIDE_M)),
-            F::Drawn => return self.drawn.clone(),
+            EncoderDead => (wheel, Scaled(0.0)),
+            EncoderReversed => (wheel, Scaled(-1.0)),
+            EncoderLow => (wheel, Scaled(self.drawn(LOW))),
+            EncoderLower => (wheel, Scaled(self.drawn(LOWER))),
+            EncoderRuns => (wheel, Drifts(self.drawn(RUNS_COUNTS_S) * COUNT_RAD)),
+            CountsJump => (wheel, Jumps(JUMPS_RAD_S)),
+            GyroStops => (Gyro, Stuck),
+            GyroDrifts => (Gyro, Drifts(self.drawn(DRIFTS_DEG_S).to_radians())),
+            GyroSaturates => (Gyro, Capped(self.drawn(SATURATES_DEG_S).to_radians())),
+            RangeInvalid => (AllRanges, Wild(1.0, [NO_READING; 2])),
+            RangeStuck => (AllRanges, Wild(1.0, [self.words.stuck_m(); 2])),
+            RangeFrozen => (AllRanges, Stuck),
+            RangeNear => (AllRanges, Near(self.drawn(NEAR_M))),
+            RangeRandom => (AllRanges, Wild(1.0, RANDOM_M)),
+            RangeSilent | RangeDeaf => (AllRanges, Deaf(1.0)),
+            SonarsDeaf => (HalfOfRanges(self.channel), Deaf(1.0)),
+            FrontStuck => (Range(0), Stuck),
+            FrontWide => (Range(0), Wild(1.0, WIDE_M)),
+            Drawn => return self.drawn.clone(),
             _ => return None,
         };
         Some(Lie::new(stream, change, self.chance.bits()))
@@ -191,11 +191,11 @@ impl FaultInjector {
     }
 
     fn changed(&mut self, fault: RobotFault, mut said: Said, now: Duration) -> Vec<u8> {
-        use RobotFault as F;
+        use RobotFault::*;
         match fault {
-            F::Silence => return Vec::new(),
-            F::StreamsStop if said.stream().is_some() => return Vec::new(),
-            F::FramesSlow => {
+            Silence => return Vec::new(),
+            StreamsStop if said.stream().is_some() => return Vec::new(),
+            FramesSlow => {
                 if let Some(stream) = said.stream() {
                     let next = &mut self.next_slow[stream];
                     if now < *next {
@@ -204,20 +204,20 @@ impl FaultInjector {
                     *next = now + SLOW;
                 }
             }
-            F::Garbage => {
+            Garbage => {
                 let bytes = said.bytes();
                 return [&bytes[..bytes.len() / 2], b"\n"].concat();
             }
-            F::MotorOnes => return said.with_data(0xff),
-            F::MotorZeros => return said.with_data(0),
-            F::RangeMissing if said.is_frame() && !said.report.ranges.is_empty() => {
+            MotorOnes => return said.with_data(0xff),
+            MotorZeros => return said.with_data(0),
+            RangeMissing if said.is_frame() && !said.report.ranges.is_empty() => {
                 return Vec::new();
             }
-            F::RangeMissing => {
+            RangeMissing => {
                 let Report { ranges, scan, scans, .. } = &mut said.report;
                 (*ranges, *scan, *scans) = Default::default();
             }
-            F::RangeLate => {
+            RangeLate => {
                 let kind = said.readings();
                 let age = Duration::from_secs_f64(self.drawn(RANGE_LATE_S));
                 let old = self.old(now, age, |old| old.readings() == kind);
@@ -225,7 +225,7 @@ impl FaultInjector {
                     said = said.with_readings_of(old.clone());
                 }
             }
-            F::RangeDeaf if self.newest_speeds().is_none_or(|speeds| speeds == [0.0; 2]) => {}
+            RangeDeaf if self.newest_speeds().is_none_or(|speeds| speeds == [0.0; 2]) => {}
             _ if self.lie.is_some() => {
                 let lie = self.lie.iter_mut();
                 lie.for_each(|lie| lie.change(&mut said.report, &self.newest, now));
@@ -241,28 +241,28 @@ impl FaultInjector {
 
     /// Changes the wheels of `said`, relative to those before the fault.
     fn miscount(&mut self, fault: RobotFault, said: &mut Said) {
-        use RobotFault as F;
+        use RobotFault::*;
         let Some(mut angles) = said.report.wheels else { return };
         let mut speeds = said.report.speeds.unwrap_or_default();
         let base = self.base.get_or_insert_with(|| said.clone());
-        if fault == F::MotorRepeated {
+        if fault == MotorRepeated {
             *said = base.clone();
             return;
         }
         let before = base.report.wheels.unwrap_or(angles);
         let turned = [0, 1].map(|wheel| angles[wheel] - before[wheel]);
         match fault {
-            F::EncodersSwapped => {
+            EncodersSwapped => {
                 angles = [0, 1].map(|wheel| before[wheel] + turned[1 - wheel]);
                 speeds.reverse();
             }
-            F::CountsRandom => {
+            CountsRandom => {
                 let mut random = |least, most| self.chance.within(least, most) * COUNT_RAD;
                 angles = [(); 2].map(|()| random(0.0, COUNT_CYCLE.into()));
                 speeds = [(); 2].map(|()| random(-RANDOM_COUNTS_S, RANDOM_COUNTS_S));
             }
-            F::CountsReset => angles = turned,
-            F::HeldWheels if self.pushes => said.report.held = Some([true; 2]),
+            CountsReset => angles = turned,
+            HeldWheels if self.pushes => said.report.held = Some([true; 2]),
             _ => {}
         }
         (said.report.wheels, said.report.speeds) = (Some(angles), Some(speeds));

@@ -222,6 +222,7 @@ impl Lie {
         (truth, before): (f64, Option<f64>),
         now: Duration,
     ) -> Option<f64> {
+        use Change::*;
         if self.channels.len() <= number {
             self.channels.resize_with(number + 1, Channel::default);
         }
@@ -237,33 +238,31 @@ impl Lie {
         channel.history.drain(..channel.history.len().saturating_sub(MOST_KEPT));
         let zero = if is_angle { onset } else { 0.0 };
         channel.told = match self.change {
-            Change::Scaled(factor) => zero + factor * (truth - zero),
-            Change::Shifted(by) => truth + by,
-            Change::Drifts(by) => truth + by * seconds,
-            Change::Stuck => onset,
-            Change::Near(by) => {
+            Scaled(factor) => zero + factor * (truth - zero),
+            Shifted(by) => truth + by,
+            Drifts(by) => truth + by * seconds,
+            Stuck => onset,
+            Near(by) => {
                 let of = if number < BEAMS { 1.0 } else { onset / 10.0 };
                 onset + of * chance.within(-by, by)
             }
-            Change::Late(by_s) => {
+            Late(by_s) => {
                 let old = |(at, _): &&(Duration, f64)| *at + Duration::from_secs_f64(by_s) <= now;
                 channel.history.iter().rfind(old).map_or(onset, |(_, old)| *old)
             }
-            Change::Noisy(by) => truth + chance.within(-by, by),
-            Change::Jumps(by) if is_angle => truth + by * seconds.floor(),
-            Change::Jumps(by) => truth + by * (seconds.floor() % 2.0),
-            Change::Capped(most) if is_angle => {
+            Noisy(by) => truth + chance.within(-by, by),
+            Jumps(by) if is_angle => truth + by * seconds.floor(),
+            Jumps(by) => truth + by * (seconds.floor() % 2.0),
+            Capped(most) if is_angle => {
                 let most = most * (now - then).as_secs_f64();
                 channel.told + (truth - last).clamp(-most, most)
             }
-            Change::Capped(most) => truth.min(most),
-            Change::Coarse(step) => (truth / step).round() * step,
-            Change::Pauses(for_s) if seconds % PAUSES_EVERY_S < for_s => channel.told,
-            Change::Wild(share, [least, most]) if chance.chance(share) => {
-                chance.within(least, most)
-            }
-            Change::Deaf(share) if chance.chance(share) => return None,
-            Change::Pauses(_) | Change::Wild(..) | Change::Deaf(_) => truth,
+            Capped(most) => truth.min(most),
+            Coarse(step) => (truth / step).round() * step,
+            Pauses(for_s) if seconds % PAUSES_EVERY_S < for_s => channel.told,
+            Wild(share, [least, most]) if chance.chance(share) => chance.within(least, most),
+            Deaf(share) if chance.chance(share) => return None,
+            Pauses(_) | Wild(..) | Deaf(_) => truth,
         };
         Some(channel.told)
     }
