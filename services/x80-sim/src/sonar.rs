@@ -43,38 +43,6 @@ struct Candidate {
     share: f64,
 }
 
-#[derive(Clone, Copy, Debug)]
-struct Sector {
-    origin: DVec2,
-    axis: DVec2,
-    half: f64,
-}
-
-impl Sector {
-    fn edges(&self) -> [DVec2; 2] {
-        [self.half, -self.half].map(|angle| DVec2::from_angle(angle).rotate(self.axis))
-    }
-
-    fn contains(&self, direction: DVec2) -> bool {
-        off_axis(self.axis, direction) <= self.half + 1e-12
-    }
-
-    fn nearest(&self, from: DVec2, to: DVec2) -> Option<DVec2> {
-        let surface = Surface::Face { from, to };
-        let foot = common::geometry::nearest_on_segment(self.origin, from, to);
-        let crossings = self.edges().into_iter().filter_map(|edge| {
-            let range = surface.hit(self.origin, edge)?;
-            Some(edge * range)
-        });
-        [foot, from, to]
-            .into_iter()
-            .map(|point| point - self.origin)
-            .filter(|offset| self.contains(*offset))
-            .chain(crossings)
-            .min_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))
-    }
-}
-
 fn off_axis(axis: DVec2, direction: DVec2) -> f64 {
     axis.perp_dot(direction).atan2(axis.dot(direction)).abs()
 }
@@ -145,7 +113,10 @@ fn bounced(world: &World, pose: Pose2, physics: &SonarPhysics, noise: &mut Noise
 
 struct Receiver<'a> {
     physics: &'a SonarPhysics,
-    cone: Sector,
+    origin: DVec2,
+    axis: DVec2,
+    /// Half the cone's angle.
+    half: f64,
     lobe: f64,
     /// Height above the floor, metres.
     height: f64,
@@ -157,19 +128,43 @@ impl<'a> Receiver<'a> {
         let half = physics.cone_deg.to_radians();
         Self {
             physics,
-            cone: Sector { origin: pose.position, axis: pose.axis(), half },
+            origin: pose.position,
+            axis: pose.axis(),
+            half,
             lobe: physics.lobe_deg.to_radians().max(half),
             height,
             threshold: amplitude(physics.post_reach_m, Some(POST_RADIUS_M)),
         }
     }
 
+    fn edges(&self) -> [DVec2; 2] {
+        [self.half, -self.half].map(|angle| DVec2::from_angle(angle).rotate(self.axis))
+    }
+
+    fn contains(&self, direction: DVec2) -> bool {
+        off_axis(self.axis, direction) <= self.half + 1e-12
+    }
+
+    fn nearest(&self, from: DVec2, to: DVec2) -> Option<DVec2> {
+        let surface = Surface::Face { from, to };
+        let foot = common::geometry::nearest_on_segment(self.origin, from, to);
+        let crossings = self.edges().into_iter().filter_map(|edge| {
+            let range = surface.hit(self.origin, edge)?;
+            Some(edge * range)
+        });
+        [foot, from, to]
+            .into_iter()
+            .map(|point| point - self.origin)
+            .filter(|offset| self.contains(*offset))
+            .chain(crossings)
+            .min_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))
+    }
+
     fn reach(&self, off: f64) -> f64 {
-        let cone = self.cone.half;
-        if off <= cone + 1e-12 {
+        if off <= self.half + 1e-12 {
             REACH_M
         } else if off < self.lobe {
-            REACH_M * (self.lobe - off) / (self.lobe - cone)
+            REACH_M * (self.lobe - off) / (self.lobe - self.half)
         } else {
             0.0
         }
@@ -195,7 +190,7 @@ impl<'a> Receiver<'a> {
             return Some(candidate);
         }
         let range = candidate.range.hypot(gap);
-        let in_cone = gap.atan2(candidate.range) <= self.cone.half && range <= REACH_M;
+        let in_cone = gap.atan2(candidate.range) <= self.half && range <= REACH_M;
         let raised = Candidate { range, ..candidate };
         if self.is_rough() {
             return in_cone.then_some(raised);
@@ -213,26 +208,25 @@ impl<'a> Receiver<'a> {
     }
 
     fn drum(&self, at: DVec2, radius: f64) -> Option<Candidate> {
-        let to_centre = at - self.cone.origin;
+        let to_centre = at - self.origin;
         let range = to_centre.length() - radius;
         if range <= 0.0 {
-            return Some(heard(self.cone.axis * 1e-9, false));
+            return Some(heard(self.axis * 1e-9, false));
         }
-        let off = off_axis(self.cone.axis, to_centre);
+        let off = off_axis(self.axis, to_centre);
         if range <= self.reach(off) {
-            let weak = off > self.cone.half + 1e-12;
+            let weak = off > self.half + 1e-12;
             return Some(heard(to_centre.normalize_or_zero() * range, weak));
         }
         // The nearest point is outside the cone, but the cone may still meet the flank.
         let drum = Surface::Drum { at, radius };
         let limit = self.physics.drum_limit_deg.to_radians();
         let flank = |edge: DVec2| {
-            let range = drum.hit(self.cone.origin, edge)?;
+            let range = drum.hit(self.origin, edge)?;
             let incidence = off_axis(-edge, edge * range - to_centre);
             (range <= REACH_M && incidence <= limit).then_some(edge * range)
         };
         let nearest = self
-            .cone
             .edges()
             .into_iter()
             .filter_map(flank)
@@ -241,27 +235,27 @@ impl<'a> Receiver<'a> {
     }
 
     fn face(&self, from: DVec2, to: DVec2) -> [Option<Candidate>; 2] {
-        let origin = self.cone.origin;
+        let origin = self.origin;
         let Some(along) = (to - from).try_normalize() else {
             return [None; 2];
         };
         let foot = from + along * (origin - from).dot(along) - origin;
         let limit = self.physics.wall_limit_deg.to_radians();
-        let off = if foot.length_squared() > 1e-18 { off_axis(self.cone.axis, foot) } else { 0.0 };
+        let off = if foot.length_squared() > 1e-18 { off_axis(self.axis, foot) } else { 0.0 };
         // A rough wall echoes even where the cone only grazes it.
         if off <= limit + 1e-12 || self.is_rough() {
             let share = (foot + origin - from).dot(along) / (to - from).length();
             if (0.0..=1.0).contains(&share) && foot.length() <= self.reach(off) {
-                let weak = off > 0.8 * limit || off > self.cone.half + 1e-12;
+                let weak = off > 0.8 * limit || off > self.half + 1e-12;
                 return [Some(heard(foot, weak)), None];
             }
-            let nearest = self.cone.nearest(from, to);
+            let nearest = self.nearest(from, to);
             let nearest = nearest.filter(|offset| offset.length() <= REACH_M);
             return [nearest.map(|offset| heard(offset, false)), None];
         }
         [from, to].map(|end| {
             let offset = end - origin;
-            let near = offset.length() <= self.physics.edge_reach_m && self.cone.contains(offset);
+            let near = offset.length() <= self.physics.edge_reach_m && self.contains(offset);
             let share = self.physics.edge_share;
             (near && share > 0.0).then(|| Candidate { share, ..heard(offset, true) })
         })
