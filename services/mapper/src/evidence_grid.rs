@@ -224,10 +224,10 @@ impl EvidenceGrid {
                 && (is_crossed || is_within(pointed))
                 && !self.is_scanned(index)
             {
-                self.looks[index] += 1;
-                if self.is_scanned(index) {
-                    self.looks[index] = SCANNED;
-                    self.news.window = self.news.window.including(cell);
+                if self.looks[index] + 1 < POINTED_ENOUGH {
+                    self.looks[index] += 1;
+                } else {
+                    self.scan(cell);
                 }
             }
             if range <= clear_to && (is_within(at_edge) || is_crossed && is_within(twice)) {
@@ -339,7 +339,7 @@ impl EvidenceGrid {
         let was_occupied = self.is_occupied(index);
         let is_over = change == 0 || change < 0 && self.weight_of(index) == sonar::LEAST;
         let was_scanned = self.is_scanned(index);
-        self.looks[index] = SCANNED;
+        self.scan(cell);
         if was_scanned && is_over {
             return;
         }
@@ -349,7 +349,7 @@ impl EvidenceGrid {
         if change > 0 || change < 0 && self.occupied[index] & TOUCHED == 0 {
             self.weigh(cell, change);
         }
-        if !was_scanned || was_occupied != self.is_occupied(index) {
+        if was_occupied != self.is_occupied(index) {
             self.news.window = self.news.window.including(cell);
         }
     }
