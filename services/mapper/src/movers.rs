@@ -205,7 +205,7 @@ impl Movers {
         );
         let new = things.iter().zip(is_free).filter(|(_, is_free)| *is_free);
         self.tracks.extend(new.map(|(thing, _)| Track::new(thing)));
-        if self.tracks.iter().any(|track| track.is_mover) {
+        if self.count() > 0 {
             self.seen_s = Some(at_s);
         }
     }
@@ -403,7 +403,8 @@ fn things(fan: &Fan<'_>, before: Option<&Fan<'_>>, at_s: f64) -> Vec<Thing> {
         let spacing_m = fan.step_rad * mean.distance(fan.origin);
         let half_width_m = 0.5 * (width_m + spacing_m);
         let noise_m = MIDDLE_M + 0.5 * spacing_m + fan.deviation_m(mean) / number.sqrt();
-        let nearest = points.iter().map(|it| it.distance(fan.origin)).fold(f64::INFINITY, f64::min);
+        let nearest_m =
+            points.iter().map(|it| it.distance(fan.origin)).fold(f64::INFINITY, f64::min);
         let came = before.is_some_and(|before| {
             let came = points.iter().filter(|it| Difference::of(before, **it).is_other());
             let is_whole = from_own && to_own && points.len() >= LEAST_BEAMS;
@@ -411,7 +412,6 @@ fn things(fan: &Fan<'_>, before: Option<&Fan<'_>>, at_s: f64) -> Vec<Thing> {
         });
         let own = [from_own.then_some(*from), to_own.then_some(*to)];
         let origin = fan.origin;
-        let nearest_m = nearest;
         things.push(Thing { at_s, origin, own, mean, nearest_m, half_width_m, noise_m, came });
     }
     things
