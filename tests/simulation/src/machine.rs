@@ -16,7 +16,6 @@ use common::{
     bus::{Bus, Memory},
     clock::Pace,
     ground_truth::GroundTruthTick,
-    kinematics::Pose2,
     machine::{Files, Machine, MachineWire},
     mission::Mission,
     run::Run,
@@ -127,7 +126,7 @@ impl SimulatedMachine {
     }
 
     pub(crate) fn now(&self) -> Duration {
-        Duration::from_nanos(self.now_ns.get() - BEGIN_NS)
+        Duration::from_nanos(self.monotonic_ns() - BEGIN_NS)
     }
 
     pub(crate) fn place(&self, robot: Robot) {
@@ -215,9 +214,9 @@ impl SimulatedMachine {
     pub(crate) fn pass(&self, time: Duration) {
         self.running.set(OBSERVER);
         for process in self.processes.borrow_mut().values_mut() {
-            (process.is_terminated, process.due_ns) = (true, self.now_ns.get());
+            (process.is_terminated, process.due_ns) = (true, self.monotonic_ns());
         }
-        self.run_until(self.now_ns.get() + time.as_nanos() as u64, &mut || false);
+        self.run_until(self.monotonic_ns() + time.as_nanos() as u64, &mut || false);
     }
 
     fn new_process(&self) -> u32 {
@@ -231,7 +230,7 @@ impl SimulatedMachine {
         if generation.stage == LINK {
             self.guard.borrow_mut().run = Some(run.clone());
         }
-        let due_ns = self.now_ns.get() + self.lateness().0;
+        let due_ns = self.monotonic_ns() + self.lateness().0;
         let started = Process::new(generation, run, due_ns);
         self.processes.borrow_mut().insert(process, started);
         process
@@ -248,7 +247,7 @@ impl SimulatedMachine {
             _ if process.frozen => {}
             Signal::ABORT => self.end(process, killed_by(signal)),
             Signal::TERM if process.turns.is_none() => self.end(process, killed_by(signal)),
-            _ => (process.is_terminated, process.due_ns) = (true, self.now_ns.get()),
+            _ => (process.is_terminated, process.due_ns) = (true, self.monotonic_ns()),
         }
     }
 
@@ -263,7 +262,7 @@ impl SimulatedMachine {
     pub(crate) fn activity(&self, process: u32) -> Option<Activity> {
         let processes = self.processes.borrow();
         let process = processes.get(&process).filter(|process| process.is_live())?;
-        Some(process.activity(self.now_ns.get()))
+        Some(process.activity(self.monotonic_ns()))
     }
 
     /// Draws the time from a wakeup to its turn, and which part of it the process starves.
@@ -300,12 +299,12 @@ impl SimulatedMachine {
         let mut until_ns = None;
         while !self.is_over() {
             if until_ns.is_none() && is_ready() {
-                until_ns = Some((self.now_ns.get() + self.lateness().0).min(deadline_ns));
+                until_ns = Some((self.monotonic_ns() + self.lateness().0).min(deadline_ns));
             }
             let due = self.next().filter(|(at_ns, _)| *at_ns <= until_ns.unwrap_or(deadline_ns));
             let Some((at_ns, event)) = due else { break };
             self.pass_to(at_ns);
-            if self.now_ns.get() > self.ends_ns.get() {
+            if self.monotonic_ns() > self.ends_ns.get() {
                 self.break_off("a run ends", "it outlasts its mission's timeout".to_owned());
             }
             self.execute(&event);
@@ -315,7 +314,7 @@ impl SimulatedMachine {
     }
 
     fn pass_to(&self, time_ns: u64) {
-        self.now_ns.set(self.now_ns.get().max(time_ns));
+        self.now_ns.set(self.monotonic_ns().max(time_ns));
     }
 
     fn execute(&self, event: &Event) {
@@ -327,7 +326,6 @@ impl SimulatedMachine {
         } else if self.events.get() - since > MOST_EVENTS {
             self.break_off("time passes", format!("{MOST_EVENTS} events in a second"));
         }
-        let now_ns = self.now_ns.get();
         match event {
             Event::Disturbance => {
                 if let Some(Disturbance { what, .. }) = self.disturbances.borrow_mut().pop() {
@@ -349,7 +347,7 @@ impl SimulatedMachine {
             Event::Guard => {
                 self.running.set(GUARD);
                 let is_succeeded = self.is_open(LINK);
-                self.guard.borrow_mut().turn(now_ns, is_succeeded);
+                self.guard.borrow_mut().turn(self.monotonic_ns(), is_succeeded);
             }
             Event::Turn(process) => self.turn(*process),
         }
@@ -372,7 +370,7 @@ impl SimulatedMachine {
         for (to, datagram) in robot.simulated.sent() {
             let to = to.port();
             let Some(faults) = &self.faults else {
-                lane.send(to, &datagram, self.now_ns.get());
+                lane.send(to, &datagram, self.monotonic_ns());
                 continue;
             };
             for late in faults.borrow_mut().report(&datagram, self.now()) {
@@ -383,7 +381,7 @@ impl SimulatedMachine {
 
     pub(crate) fn send_to_robot(&self, from: Port, bytes: &[u8]) {
         self.invariants.borrow_mut().on_sent(bytes, self.now());
-        self.wires.borrow_mut().lane(Way::ToRobot).send(from, bytes, self.now_ns.get());
+        self.wires.borrow_mut().lane(Way::ToRobot).send(from, bytes, self.monotonic_ns());
     }
 
     fn judge(&self, checked: Checked) {
@@ -429,7 +427,7 @@ impl SimulatedMachine {
     fn make_ready(&self, process: &mut Process) {
         let (late_ns, starved) = self.lateness();
         process.starves = starved;
-        let from_ns = self.now_ns.get().max(process.busy_until_ns);
+        let from_ns = self.monotonic_ns().max(process.busy_until_ns);
         process.woken_ns = Some(from_ns + late_ns);
     }
 
@@ -439,7 +437,7 @@ impl SimulatedMachine {
             && process.turns.is_some()
         {
             self.make_ready(process);
-            if process.woken_ns > Some(self.now_ns.get()) {
+            if process.woken_ns > Some(self.monotonic_ns()) {
                 return;
             }
         }
@@ -466,7 +464,7 @@ impl SimulatedMachine {
         };
         let work = self.load.work;
         process.ran += work;
-        process.busy_until_ns = self.now_ns.get() + work.as_nanos() as u64;
+        process.busy_until_ns = self.monotonic_ns() + work.as_nanos() as u64;
         match turned {
             _ if self.has_met_doom(number) => {
                 self.end(&mut process, killed_by(Signal::KILL));
@@ -476,7 +474,7 @@ impl SimulatedMachine {
                 process.due_ns = process.busy_until_ns + patience.as_nanos() as u64;
             }
             Ok(None) if process.is_terminated => self.end(&mut process, ExitCause::Exited(0)),
-            Ok(None) => process.spins_since_ns = Some(self.now_ns.get()),
+            Ok(None) => process.spins_since_ns = Some(self.monotonic_ns()),
         }
         self.processes.borrow_mut().insert(number, process);
     }
@@ -518,10 +516,10 @@ impl SimulatedMachine {
             Freeze(stage) => self.with(stage, |process| process.frozen = true),
             Thaw(stage) => self.with(stage, |process| {
                 process.frozen = false;
-                process.due_ns = process.due_ns.max(self.now_ns.get());
+                process.due_ns = process.due_ns.max(self.monotonic_ns());
             }),
             Hang(stage) => {
-                self.with(stage, |process| process.spins_since_ns = Some(self.now_ns.get()));
+                self.with(stage, |process| process.spins_since_ns = Some(self.monotonic_ns()));
             }
             Wire(way, quality) => self.wires.borrow_mut().lane(*way).quality = *quality,
             Ask(request) => self.ask(*request),
@@ -546,9 +544,7 @@ impl SimulatedMachine {
 
     /// Publishes an operator's request.
     pub(crate) fn ask(&self, request: Request) {
-        let here = self
-            .truth()
-            .map(|truth| Pose2 { position: [truth.x, truth.y].into(), heading: truth.heading });
+        let here = self.truth().map(|truth| truth.pose());
         // Nobody hears an operator while there is no supervisor.
         let _ = self.as_operator(|bus| request.publish(bus, here.unwrap_or_default()));
     }
@@ -573,7 +569,7 @@ impl SimulatedMachine {
     fn end(&self, process: &mut Process, cause: ExitCause) {
         (process.exit, process.turns, process.starts) = (Some(cause), None, None);
         if process.stage == LINK {
-            self.guard.borrow_mut().on_link_ended(self.now_ns.get());
+            self.guard.borrow_mut().on_link_ended(self.monotonic_ns());
         }
     }
 }
@@ -592,7 +588,7 @@ impl Machine for SimulatedMachine {
             return is_ready();
         }
         let timeout_ns = timeout.max(LEAST_WAIT).as_nanos() as u64;
-        let deadline_ns = self.now_ns.get().saturating_add(timeout_ns);
+        let deadline_ns = self.monotonic_ns().saturating_add(timeout_ns);
         self.run_until(deadline_ns, &mut || self.supervisor_is_killed() || is_ready());
         is_ready()
     }
