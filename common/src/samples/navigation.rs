@@ -333,8 +333,7 @@ impl TargetSample {
     }
 
     pub fn ahead(&self) -> &[TargetPoint] {
-        let count = usize::try_from(self.last.saturating_sub(self.number)).unwrap_or(MOST_TARGETS);
-        &self.ahead[..count.min(MOST_TARGETS)]
+        counted(&self.ahead, self.last.saturating_sub(self.number))
     }
 }
 
