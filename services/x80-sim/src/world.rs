@@ -1,7 +1,7 @@
 //! World of a mission, with things that appear, vanish or move.
 
 use common::{
-    geometry::{Box2, Profile, Shapes, Wall, distance_to_segment, nearest_on_segment},
+    geometry::{Profile, Shapes, distance_to_segment, nearest_on_segment},
     kinematics::{Pose2, Twist},
     mission::{Footprint, Heights, Hole, Mission, Move, Thing, lasts},
 };
@@ -96,10 +96,9 @@ fn solids_of(shapes: &Shapes) -> Vec<Solid> {
         profile: drum.profile(),
     });
     let face = |profile| move |(from, to)| Solid { surface: Surface::Face { from, to }, profile };
-    let walls = |wall: &'_ Wall| wall.edges().map(face(wall.profile())).collect::<Vec<_>>();
-    let boxes = |block: &Box2| block.edges().map(face(block.profile())).collect::<Vec<_>>();
-    let walls = shapes.walls.iter().flat_map(walls);
-    drums.chain(walls).chain(shapes.boxes.iter().flat_map(boxes)).collect()
+    let walls = shapes.walls.iter().flat_map(|wall| wall.edges().map(face(wall.profile())));
+    let boxes = shapes.boxes.iter().flat_map(|block| block.edges().map(face(block.profile())));
+    drums.chain(walls).chain(boxes).collect()
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
