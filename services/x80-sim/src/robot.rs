@@ -57,17 +57,18 @@ pub(crate) enum Said<'a> {
 
 impl Said<'_> {
     pub(crate) fn kind(self) -> Heard {
+        use Heard::*;
         match self {
-            Self::Frame(frame) if Addressing::of_robot(frame.rid).is_none() => Heard::Foreign,
+            Self::Frame(frame) if Addressing::of_robot(frame.rid).is_none() => Foreign,
             Self::Frame(frame) => match Command::parse(frame) {
-                Ok(Command::System(SystemSignal::Ack)) => Heard::Ack,
-                Ok(Command::System(SystemSignal::Ping)) => Heard::Ping,
-                Ok(Command::Motion(_)) if !Addressing::is_multimedia(frame.rid) => Heard::Motion,
-                Ok(_) | Err(_) => Heard::Other,
+                Ok(Command::System(SystemSignal::Ack)) => Ack,
+                Ok(Command::System(SystemSignal::Ping)) => Ping,
+                Ok(Command::Motion(_)) if !Addressing::is_multimedia(frame.rid) => Motion,
+                Ok(_) | Err(_) => Other,
             },
-            Self::Order(Order::Drive { .. }) | Self::Request(Request::Speeds(_)) => Heard::Motion,
-            Self::Order(Order::Ping {}) => Heard::Ping,
-            Self::Order(_) | Self::Request(_) => Heard::Other,
+            Self::Order(Order::Drive { .. }) | Self::Request(Request::Speeds(_)) => Motion,
+            Self::Order(Order::Ping {}) => Ping,
+            Self::Order(_) | Self::Request(_) => Other,
         }
     }
 
