@@ -106,15 +106,12 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
             }
             std::thread::park_timeout(left.min(LOOK_EVERY));
         }
-        let mut came = false;
-        loop {
+        let came = loop {
             let left = timeout.saturating_sub(began.elapsed());
-            if let Some(joined) = &self.joined {
-                let waited = joined.waiter.wait_also_for(others, left.min(LOOK_EVERY));
-                came = waited.unwrap_or(false);
-            }
-            if came {
-                break;
+            if let Some(joined) = &self.joined
+                && joined.waiter.wait_also_for(others, left.min(LOOK_EVERY)).unwrap_or(false)
+            {
+                break true;
             }
             if self.ending {
                 (self.joined, self.ending) = (None, false);
@@ -122,13 +119,12 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
             }
             if self.on_disconnected() {
                 self.ending = true;
-                came = true;
-                break;
+                break true;
             }
             if left.is_zero() {
-                break;
+                break false;
             }
-        }
+        };
         Ok(match &mut self.joined {
             Some(joined) if came => Event::Samples(&mut joined.topics),
             _ => Event::Nothing,

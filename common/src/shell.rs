@@ -509,15 +509,13 @@ impl Heartbeat {
 
     fn beat(&mut self, state: HealthState, progress: Progress) -> Result {
         self.beat_quietly(state, progress)?;
-        self.writer.wake()?;
-        Ok(())
+        Ok(self.writer.wake()?)
     }
 
     fn beat_quietly(&mut self, state: HealthState, progress: Progress) -> Result {
         self.sample.state = state.into();
         (self.last, self.tick) = (Instant::now(), progress.tick);
-        self.writer.publish_quietly(progress.tick, progress.time, self.sample, &[])?;
-        Ok(())
+        Ok(self.writer.publish_quietly(progress.tick, progress.time, self.sample, &[])?)
     }
 
     /// Publishes `trouble` with the present time: readers drop old trouble, and the stage may have

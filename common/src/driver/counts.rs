@@ -67,9 +67,10 @@ impl From<[u16; 2]> for WheelCounts {
 }
 
 /// Takes speeds in counts/s.
-pub fn wheel_sample(counts: [u16; 2], counts_per_s: [i32; 2]) -> WheelSample {
-    let [left_counts, right_counts] = counts;
-    let [left_counts_per_s, right_counts_per_s] = counts_per_s;
+pub fn wheel_sample(
+    [left_counts, right_counts]: [u16; 2],
+    [left_counts_per_s, right_counts_per_s]: [i32; 2],
+) -> WheelSample {
     WheelSample {
         left_counts,
         right_counts,
