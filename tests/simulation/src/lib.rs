@@ -49,8 +49,6 @@ pub use self::{
 };
 use self::{machine::SimulatedMachine, robot::Robot, surroundings::Simulated};
 
-/// Directory of the run, which exists only on the simulated machine.
-const DIRECTORY: &str = "/simulation/run";
 /// Longest run, beyond the timeouts of its targets.
 const LATE: Duration = Duration::from_secs(120);
 /// Time that is watched after a run.
@@ -77,9 +75,9 @@ impl Scenario {
         RobotName::default()
     }
 
-    /// Returns the directory of the run on the simulated machine.
+    /// Returns the directory of the run, which exists only on the simulated machine.
     pub fn directory() -> PathBuf {
-        PathBuf::from(DIRECTORY)
+        PathBuf::from("/simulation/run")
     }
 
     /// Returns the undisturbed run of a simulated robot in lockstep, as `firsthand run` drives it.
