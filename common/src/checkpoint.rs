@@ -174,7 +174,6 @@ mod tests {
         Checkpoint::open(path, CAPACITY).unwrap()
     }
 
-    /// Returns a checkpoint with its path, in which these states were saved.
     fn saved(states: &[Vec<u32>]) -> (tempfile::TempDir, PathBuf, Checkpoint) {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("pose");

@@ -30,7 +30,7 @@ pub trait Driver: fmt::Debug {
     }
 }
 
-/// Driver of the robot's base. Methods other than [`Base::velocity`] depend on the robot.
+/// Methods other than [`Base::velocity`] depend on the robot.
 pub trait Base: Driver {
     /// Encodes a command for the two wheels, or a car's wheel and steering, counts/s, forward
     /// positive. The robot stops by itself after `limit`.
@@ -56,8 +56,7 @@ pub trait Base: Driver {
         Vec::new()
     }
 
-    /// Returns how many acknowledgements the robot owes for these bytes; [`Heard::acknowledged`]
-    /// counts them.
+    /// Acknowledgements due for these bytes; [`Heard::acknowledged`] counts them.
     fn owed(&self, _sent: &[u8]) -> usize {
         0
     }

@@ -42,7 +42,6 @@ pub(crate) enum Store {
 }
 
 impl Store {
-    /// Opens a file with [`reserved`] space.
     pub(crate) fn open(path: &Path, length: u64) -> io::Result<Self> {
         match machine::simulated() {
             Some(machine) => killed().map(|()| Self::Simulated(machine.files().open(path))),
@@ -138,7 +137,7 @@ pub fn read_text(file: &Path) -> io::Result<String> {
     String::from_utf8(content).map_err(io::Error::other)
 }
 
-/// Returns whether there is a file or link at `path`.
+/// Links count, too.
 pub fn exists(path: &Path) -> bool {
     match machine::simulated() {
         Some(machine) => machine.files().exists(path),

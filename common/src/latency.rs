@@ -38,7 +38,7 @@ impl Histogram {
         self.max_ns = self.max_ns.max(max_ns);
     }
 
-    /// Returns the upper end of the bucket of the `share` quantile, at most the longest latency.
+    /// Returns the upper end of the quantile's bucket, at most the longest latency.
     pub fn quantile_us(&self, share: f64) -> Option<f64> {
         assert!((0.0..=1.0).contains(&share));
         let total = self.total();

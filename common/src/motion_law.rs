@@ -117,7 +117,7 @@ impl MotionLaw {
         }
     }
 
-    /// Returns the side to turn to, and keeps it near the antipode.
+    /// Keeps the side near the antipode.
     fn side(&self, Alignment { cosine, sine }: Alignment, side: &mut f64) -> f64 {
         if cosine > 0.0 {
             return sine.signum();

@@ -233,8 +233,8 @@ pub fn run_stage<P: Process>(start: &Start) -> Result {
 
 /// A stage's process on a simulated machine, which gives it turns.
 pub trait Simulated {
-    /// Takes a turn. Returns the time after which the next is due without input; `None` if the
-    /// process hangs by request.
+    /// Returns the time after which the next is due without input; `None` if the process hangs by
+    /// request.
     fn turn(&mut self) -> Result<Option<Duration>>;
 
     /// The wires of the link wake it apart from this.

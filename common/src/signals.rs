@@ -46,7 +46,6 @@ impl Signals {
         Self::catch(&[SIGINT, SIGTERM, SIGHUP])
     }
 
-    /// Returns whether a signal is waiting for [`Self::came`].
     pub fn pending(&self) -> bool {
         poll::is_readable(self, Duration::ZERO).unwrap_or(true)
     }

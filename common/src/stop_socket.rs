@@ -156,7 +156,6 @@ impl Operator {
         self.socket.send(&[request as u8]).map(drop)
     }
 
-    /// Returns whether the process at the other end lives.
     pub fn is_heard(&self) -> bool {
         // A datagram without a byte is no request. A full queue has a reader.
         matches!(

@@ -151,7 +151,6 @@ topics! {
     INPUTS "inputs": InputsHeader u8, EVERY_STAGE, Rate::WhenItHappens, limits: Limits::DEEP;
 }
 
-/// Returns the topic of this name.
 pub fn find(name: &str) -> Option<&'static dyn AnyTopic> {
     TABLE.iter().copied().find(|topic| topic.spec().name == name)
 }

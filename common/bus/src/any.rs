@@ -34,7 +34,6 @@ pub trait AnyTopic: Sync {
 }
 
 pub trait AnyReader {
-    /// Takes the next sample.
     fn next_stamp(&mut self) -> Result<Option<(Author, Stamp)>>;
     /// Replaces `message` by the next sample (see [`super::cdr`]) and returns its stamp, if any.
     fn next_message(&mut self, message: &mut Vec<u8>) -> Result<Option<Stamp>>;

@@ -75,7 +75,7 @@ impl Writers {
         Self(Rc::new(RefCell::new(Named { supervisor, ..Named::default() })))
     }
 
-    /// Names the processes of stages. An unlisted stage keeps its process.
+    /// An unlisted stage keeps its process.
     pub fn name(&self, stages: impl IntoIterator<Item = (String, Author)>) {
         self.0.borrow_mut().name(stages);
     }

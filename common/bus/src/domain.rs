@@ -118,7 +118,7 @@ impl Domain {
         }
     }
 
-    /// Returns whether the robot has a supervisor; true if unknown.
+    /// True if unknown.
     pub fn is_supervised(&self) -> bool {
         !matches!(self.supervision(), Ok(Supervision::None))
     }
@@ -176,7 +176,6 @@ impl Domain {
         Some(fs::read_link(self.mirror_link()).ok()?.display().to_string())
     }
 
-    /// Returns the prefix of this domain's files in [`SHARED_MEMORY`].
     pub fn shared_memory_prefix(&self) -> String {
         format!("fh{}_{}_", self.owner, self.robot)
     }
@@ -207,7 +206,6 @@ files! {
     /// Returns the link whose text names the robot's machine, if this domain is a mirror.
     mirror_link: "mirror",
     stop_socket: "stop",
-    /// Returns the socket of the stop guard.
     guard_socket: "guard",
     /// Returns the link to the run directory of a robot that may be moving.
     owed_stop: "owed-stop",

@@ -1,5 +1,3 @@
-//! Errors of the bus, each with its remedy.
-
 use std::fmt::Debug;
 
 use iceoryx2::{

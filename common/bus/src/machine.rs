@@ -28,13 +28,11 @@ pub trait Machine {
 
     fn files(&self) -> &Files;
 
-    /// Opens a wire to the device at `address`.
     fn wire(&self, address: &str) -> Box<dyn MachineWire>;
 }
 
 /// Wire of datagrams to a simulated device.
 pub trait MachineWire: std::fmt::Debug {
-    /// Returns the next datagram that has come, if any.
     fn receive(&mut self) -> Option<Vec<u8>>;
 
     fn send(&mut self, bytes: &[u8]);

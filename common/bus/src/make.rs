@@ -183,12 +183,12 @@ impl Bus {
         self.writers.as_ref()
     }
 
-    /// Returns the number of this process's samples lost to full shared memory.
+    /// Samples of this process lost to full shared memory.
     pub fn lost(&self) -> u64 {
         self.lost.get()
     }
 
-    /// Returns whether another bus replaced this one or the run has ended.
+    /// Also true after the run has ended.
     pub fn is_replaced(&self) -> bool {
         let Medium::Shared { instance, .. } = &self.medium else { return false };
         BusInstance::current(&instance.domain).map_or(true, |now| now != *instance)

@@ -93,7 +93,7 @@ impl Places {
         Self { length: second.abs_diff(first), reserved: Cell::new(first) }
     }
 
-    /// Reserves memory for the place behind `taken`; returns whether it succeeded.
+    /// Returns whether it succeeded.
     pub(crate) fn reserve_behind(&self, taken: usize) -> bool {
         let (start, end) = (self.reserved.get(), taken + 2 * self.length);
         if end <= start {

@@ -24,7 +24,7 @@ impl Waiter {
         self.wakeups.push(wakeup);
     }
 
-    /// Adds `descriptor`, from which the caller reads.
+    /// The caller reads from `descriptor`.
     pub fn on_readable(&mut self, descriptor: impl AsFd) -> Result {
         let own = descriptor.as_fd().try_clone_to_owned().map_err(BusError::Wait)?;
         self.descriptors.push(own);
@@ -36,7 +36,7 @@ impl Waiter {
         self.wait_also_for(&[], timeout)
     }
 
-    /// Returns whether an event waits, on a simulated machine.
+    /// Only on a simulated machine.
     pub fn is_woken(&self) -> bool {
         self.wakeups.iter().any(Wakeup::is_woken)
     }

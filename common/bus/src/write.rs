@@ -61,7 +61,6 @@ impl<H: Stamped> Writer<H> {
 }
 
 impl<H: Stamped, E: Payload> Writer<H, E> {
-    /// Publishes a header and its `slice` like [`Writer::publish`].
     pub fn publish_slice(
         &mut self,
         tick: u64,

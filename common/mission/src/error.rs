@@ -42,7 +42,7 @@ impl MissionError {
         }
     }
 
-    /// Returns whether both report the same fault, possibly on different lines.
+    /// The lines may differ.
     pub fn is_same_fault(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Syntax { problem, .. }, Self::Syntax { problem: its, .. }) => problem == its,

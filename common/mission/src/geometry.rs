@@ -101,7 +101,7 @@ impl Wall {
 }
 
 impl Box2 {
-    /// Returns the corners, counter-clockwise.
+    /// Counter-clockwise.
     pub fn corners(&self) -> [DVec2; 4] {
         let axis = DVec2::from_angle(self.angle_deg.to_radians());
         let half = self.size_m / 2.0;
@@ -124,7 +124,7 @@ rows! {
 }
 
 impl Zone {
-    /// Returns the distance to its edge, metres; negative inside.
+    /// Metres to its edge; negative inside.
     pub fn clearance(&self, point: DVec2) -> f64 {
         let (mut nearest, mut is_inside) = (f64::INFINITY, false);
         for (from, to) in ring(&self.points) {
@@ -191,8 +191,7 @@ impl Shapes {
         shapes
     }
 
-    /// Returns the distance to the nearest surface, metres: negative inside drums and boxes,
-    /// infinite without shapes.
+    /// Metres to the nearest surface: negative inside drums and boxes, infinite without shapes.
     pub fn clearance(&self, point: DVec2) -> f64 {
         self.pieces().map(|piece| piece.clearance(point)).fold(f64::INFINITY, f64::min)
     }
@@ -207,7 +206,7 @@ pub enum Piece<'a> {
 }
 
 impl Piece<'_> {
-    /// Returns the distance to its surface, metres; negative inside.
+    /// Metres to its surface; negative inside.
     pub fn clearance(&self, point: DVec2) -> f64 {
         match self {
             Self::Drum(drum) => drum.at.distance(point) - drum.radius_m,

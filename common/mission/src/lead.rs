@@ -59,7 +59,7 @@ impl Lead {
         })
     }
 
-    /// Returns the pose and motion at which a command given now acts; `pose` belongs to `now_s`.
+    /// Where a command given now acts; `pose` belongs to `now_s`.
     pub fn foresee(&mut self, pose: Pose2, now_s: f64) -> (Pose2, Twist) {
         self.go_on(pose, now_s);
         self.begin(pose, now_s);

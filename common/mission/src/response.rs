@@ -166,7 +166,7 @@ impl ModelledSpeed {
         self.speed
     }
 
-    /// Returns the pending commands, oldest first, with their times of effect.
+    /// Oldest first, with their times of effect.
     pub fn pending(&self) -> impl Iterator<Item = (f64, f64)> {
         self.pending.iter().copied()
     }
@@ -176,7 +176,7 @@ impl ModelledSpeed {
         self.target - self.speed
     }
 
-    /// Advances to `until_s` and returns the distance since the last call.
+    /// Returns the distance since the last call.
     pub fn go_on(&mut self, until_s: f64) -> f64 {
         let mut way = 0.0;
         while let Some(&(acts_s, target)) = self.pending.front()

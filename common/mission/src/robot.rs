@@ -13,7 +13,7 @@ use crate::{
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-/// Robot model; `models.toml` holds its numbers.
+/// `models.toml` holds the numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Model {

@@ -125,7 +125,6 @@ rows! {
     }
 }
 
-/// Returns whether a thing, a block or a shove lasts at `time_s`.
 pub fn lasts(time_s: f64, from_s: f64, until_s: Option<f64>) -> bool {
     time_s >= from_s && until_s.is_none_or(|until_s| time_s < until_s)
 }

@@ -18,7 +18,7 @@ pub struct Mount {
 }
 
 impl Mount {
-    /// Returns the sensor's pose, with the heading of its middle beam.
+    /// The heading is that of its middle beam.
     pub fn on(&self, robot: Pose2) -> Pose2 {
         let outward = robot.heading + self.bearing_rad;
         let position = robot.position + self.forward_m * DVec2::from_angle(outward);

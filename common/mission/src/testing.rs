@@ -1,5 +1,3 @@
-//! Missions and comparisons of tests.
-
 use crate::{Mission, MissionError};
 
 /// Parses `text` as m.toml, after a line with a target unless it has one or begins with a
@@ -24,7 +22,6 @@ pub(crate) fn read_back(text: &str) -> Mission {
     read
 }
 
-/// Asserts that each mission is refused with these words.
 #[track_caller]
 pub(crate) fn assert_refused<T: AsRef<str>, const N: usize>(cases: [(T, &str); N]) {
     for (text, words) in cases {
@@ -39,7 +36,6 @@ pub(crate) fn close(got: f64, want: f64) {
     assert!((got - want).abs() < 1e-12, "got {got}, want {want}");
 }
 
-/// Returns the row of a laser with further keys.
 pub(crate) fn laser(name: &str, keys: &str) -> String {
     format!(
         "[[robot.sensor]]\nname = '{name}'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\n{keys}\n"

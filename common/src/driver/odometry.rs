@@ -50,8 +50,7 @@ impl Odometry {
         self.turned = [left, right];
     }
 
-    /// Returns the angles of the left and right wheel at this pose, without sideways slip; `None`
-    /// if the numbers are too great.
+    /// Without sideways slip; `None` if the numbers are too great.
     pub fn turned(&mut self, pose: [f64; 3], body: &Body) -> Option<[f64; 2]> {
         let now = pose_at(pose)?;
         let [arc, turn, _] = self.way(now);

@@ -190,7 +190,7 @@ impl Listener {
         self.woken.get()
     }
 
-    /// Clears the event; returns whether there was one.
+    /// Returns whether there was one.
     pub(super) fn drain(&self) -> bool {
         self.woken.replace(false)
     }

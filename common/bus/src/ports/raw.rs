@@ -225,7 +225,7 @@ fn service_name(spec: &Spec) -> Result<ServiceName> {
     spec.name.try_into().map_err(refused("name", spec.name))
 }
 
-/// Creates the services of a topic, which exist while the result is held.
+/// The services exist while the result is held.
 pub(crate) fn create(node: &BusNode, spec: &Spec, carried: &Carried) -> Result<Box<dyn Any>> {
     let (key, layout) = carried.layout(spec)?;
     let layout = AttributeSpecifier::new().define(&key, &layout);
@@ -492,7 +492,7 @@ impl Listener {
         matches!(self, Self::Memory(listener) if listener.is_woken())
     }
 
-    /// Clears the notifications; returns whether there were any.
+    /// Returns whether there were any.
     pub(crate) fn drain(&self) -> Result<bool> {
         match self {
             Self::Shared(listener) => {

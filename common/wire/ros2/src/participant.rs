@@ -368,7 +368,6 @@ impl Readers {
         }
     }
 
-    /// Returns whether the participant of `client` hears a reply.
     fn hears(&self, client: GUID, now: Instant) -> bool {
         self.0.iter().any(|(reader, since)| {
             reader.prefix == client.prefix && now.saturating_duration_since(*since) >= SETTLED
@@ -390,7 +389,6 @@ pub struct Server {
 }
 
 impl Server {
-    /// Returns at most `most` requests.
     pub fn take(&mut self, most: usize) -> Vec<Message> {
         self.send();
         self.requests.messages().take(most).collect()

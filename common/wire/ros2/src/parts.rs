@@ -16,7 +16,7 @@ impl Quaternion {
         Self { z, w, ..Self::default() }
     }
 
-    /// Returns the heading, radians.
+    /// Radians.
     pub fn heading(&self) -> Option<f64> {
         let Self { x, y, z, w } = self;
         let length = [x, y, z, w].iter().map(|part| *part * *part).sum::<f64>().sqrt();

@@ -14,7 +14,6 @@ fn encoded(encode: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
     out
 }
 
-/// Applies `parse` to the one sound frame in `bytes`.
 fn decoded<T>(bytes: &[u8], parse: impl FnOnce(&Frame<'_>) -> T) -> T {
     let mut decoder = Decoder::default();
     decoder.push(bytes);
