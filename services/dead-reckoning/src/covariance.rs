@@ -163,7 +163,6 @@ mod tests {
     use super::*;
     use common::mission::Mission;
 
-    /// Deviations in thousandths.
     fn model(thousandths: [u8; 4]) -> ErrorModel {
         let [slip, ratio, track, distance] = thousandths.map(|it| f64::from(it) * 1e-3);
         let text = format!(

@@ -1,5 +1,3 @@
-//! Gyro turns of a JSON robot.
-
 use common::driver::Base as _;
 
 use crate::{Driver as _, tests::driver};

@@ -260,7 +260,7 @@ impl EvidenceGrid {
         self.stand(robot);
     }
 
-    /// Returns whether an occupied cell may have caused the echo.
+    /// An occupied cell may have caused the echo.
     pub(crate) fn explains(&self, beam: &Reading) -> bool {
         let Some(echo) = beam.echo else {
             return false;
@@ -423,7 +423,7 @@ fn side_of(axis: DVec2) -> u8 {
     (axis.to_angle() / TAU * 256.0).rem_euclid(256.0) as u8
 }
 
-/// Returns the angle between two sides, radians.
+/// Radians.
 fn apart(a: u8, b: u8) -> f64 {
     let steps = a.wrapping_sub(b);
     f64::from(steps.min(steps.wrapping_neg())) * TAU / 256.0

@@ -157,7 +157,7 @@ impl Movers {
         self.tracks.iter().filter(|track| track.is_mover).count()
     }
 
-    /// Returns whether a mover may be at a place in the frame of the scans.
+    /// `place` is in the frame of the scans.
     pub(crate) fn are_at(&self, place: DVec2, at_s: f64) -> bool {
         self.tracks.iter().filter(|track| track.is_mover).any(|track| {
             let doubt_m = (SURE * track.variance_at(at_s)[0].sqrt()).min(track.radius_m);

@@ -32,7 +32,7 @@ impl Rows {
         Self { table: mission.sensor_table(), front: mission.front_row() as u8 }
     }
 
-    /// Returns the sensor of a row, if used. Samples in shared memory may hold any row.
+    /// Samples in shared memory may hold any row.
     fn used(&self, row: usize) -> Option<&Sensor> {
         self.table.get(row).filter(|sensor| sensor.used)
     }

@@ -200,10 +200,7 @@ impl Mapper {
         &self.belief
     }
 
-    /// Restores the belief of an earlier process.
-    ///
-    /// # Errors
-    /// Returns an error and keeps the map if the belief is of another mission.
+    /// Fails and keeps the map if the belief is of another mission.
     pub fn restore(&mut self, mut belief: Belief) -> Result<(), ForeignState> {
         match (&self.belief.sensed, &mut belief.sensed) {
             (Sensed::Hits, Sensed::Hits) => {}
@@ -235,12 +232,11 @@ impl Mapper {
         }
     }
 
-    /// Returns whether the sensor of `row` is used.
     pub fn uses(&self, row: u64) -> bool {
         self.rows.uses(row)
     }
 
-    /// Takes the newest tick's fix; scans may give none.
+    /// Scans may give none.
     pub const fn take_fix(&mut self) -> Option<FixSample> {
         self.fix.take()
     }
@@ -507,7 +503,6 @@ impl Mapper {
         true
     }
 
-    /// Marks an injected fault's hazard.
     fn falsify(&mut self) -> Window {
         let (frame, target) = (self.frame, self.target);
         let Belief { cells, fault, robot, target: place, .. } = &mut self.belief;

@@ -15,7 +15,7 @@ pub(crate) struct Surface {
     pub seen_m: f64,
 }
 
-/// Surfaces by square cells, row by row.
+/// By square cells, row by row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Index {
     origin: DVec2,

@@ -41,7 +41,7 @@ pub(crate) struct ActiveSensing {
     /// Length of the arc, metres: at least the stopping distance at top speed.
     ahead_m: f64,
     sonars: usize,
-    /// Whether a laser scans. It detects surfaces of any angle, so scanned ground is free.
+    /// It detects surfaces of any angle, so scanned ground is free.
     has_laser: bool,
     /// Whether the robot heads for a point of the way ahead.
     ///

@@ -85,7 +85,7 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
         }
     }
 
-    /// Waits for a result; `None` after the thread has ended.
+    /// `None` after the thread has ended.
     pub(crate) fn wait(&mut self) -> Option<Done> {
         match self {
             Self::Thread(thread) => {

@@ -143,7 +143,6 @@ impl Evasion {
         (self.kept_s, self.insists) = (0.0, false);
     }
 
-    /// Returns other advice because of `movers`.
     pub(crate) fn advise(
         &mut self,
         view: &View<'_>,
@@ -340,7 +339,7 @@ impl<'a> Scene<'a> {
         STEP_S * f64::from(way.steps) <= way.moved_s + self.evasion.fades_s
     }
 
-    /// Returns whether the robot rests before any contact if it brakes now.
+    /// If it brakes now, before any contact.
     fn rests(&self, mut way: Way) -> bool {
         while way.meets_s.is_infinite() && way.hazard_s.is_infinite() {
             let next_s = STEP_S * f64::from(way.steps + 1);

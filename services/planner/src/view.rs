@@ -61,7 +61,7 @@ impl View<'_> {
             && self.cells_within(at, depth_m, 1).all(is_hazard)
     }
 
-    /// Returns whether a cell within `radius` differs from the map of the field.
+    /// Compares the cells within `radius` with the map of the field.
     pub(crate) fn has_changed(&self, at: DVec2, radius: f64) -> bool {
         self.cells_within(at, radius, 1).any(|cell| {
             let blocked = self.is_refused(cell) || self.state(cell).is_hazard();

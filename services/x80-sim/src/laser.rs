@@ -111,7 +111,6 @@ impl Laser {
         (self.timing.delay_s + self.timing.sweep_s) * FASTEST_M_S
     }
 
-    /// Returns the scan sent at `time`.
     pub(crate) fn scan(&mut self, world: &World, pose: Pose2, time: f64) -> Vec<Option<f32>> {
         let mount = self.sensor.mount.on(pose);
         let (first, step) = self.sensor.fan();

@@ -1,5 +1,3 @@
-//! Set-ups of the tests.
-
 use common::mission::{Mission, Realism};
 
 /// Returns a mission with a target aside and these lines.

@@ -33,7 +33,7 @@ impl Surface {
         }
     }
 
-    /// Returns the outward direction; none on the surface.
+    /// None on the surface.
     pub fn outward(&self, point: DVec2) -> Option<DVec2> {
         let from = match *self {
             Self::Drum { at, .. } => at,

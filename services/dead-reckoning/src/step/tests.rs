@@ -55,7 +55,6 @@ fn close(got: f64, want: f64) {
     assert!((got - want).abs() < 1e-12, "got {got}, want {want}");
 }
 
-/// A sample of another generation of the link.
 fn by(generation: u32, mut sample: WheelSample) -> WheelSample {
     sample.stamp.generation = generation;
     sample

@@ -9,7 +9,6 @@ use glam::dvec2;
 use std::f64::consts::FRAC_PI_2;
 
 impl Mapper {
-    /// Gives it the next tick.
     fn give(&mut self, mut tick: Tick) -> Window {
         tick.pose.stamp.tick = self.belief.tick.map_or(0, |tick| tick + 1);
         self.repeat(tick)
@@ -46,14 +45,12 @@ impl Mapper {
         self.step(Input::Reset { epoch }, MissionTime(0)) == Change::Whole
     }
 
-    /// Returns the state at a place in centimetres.
     fn state_at(&self, x_cm: i32, y_cm: i32) -> CellState {
         let place = dvec2(x_cm.into(), y_cm.into()) / 100.0;
         let cell = self.frame.cell_at(place).unwrap();
         CellState::from_byte(self.belief.cells[self.frame.index(cell)])
     }
 
-    /// Returns the state at this x, centimetres, and y = 0.
     fn ahead(&self, x_cm: i32) -> CellState {
         self.state_at(x_cm, 0)
     }

@@ -1,5 +1,3 @@
-//! Tests of one channel and its speed loop.
-
 use super::*;
 use crate::noise::Source;
 use crate::testing::near;

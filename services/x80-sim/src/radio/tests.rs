@@ -1,5 +1,3 @@
-//! Tests of the radio's shares, durations and order.
-
 use common::mission::Realism;
 
 use super::*;

@@ -1,5 +1,3 @@
-//! Tests of the robot as a state machine.
-
 use common::wire::{Decoder, Quantity, Request, Stream, Targets, counts_between};
 
 use proptest::prelude::*;
@@ -63,7 +61,6 @@ fn standard(robot: &mut Robot) -> StandardSensors {
     sensors
 }
 
-/// Goes on for `ticks`.
 fn after(robot: &mut Robot, ticks: u32) -> GroundTruthTick {
     for _ in 0..ticks {
         robot.advance_to_next_tick();

@@ -1,5 +1,3 @@
-//! Tests of the evidential method.
-
 use super::*;
 use common::wire::{infrared_ad, infrared_m};
 
