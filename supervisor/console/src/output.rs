@@ -24,7 +24,6 @@ pub fn print(value: &(impl Display + Serialize), json: bool) -> Result {
     print_rows(std::slice::from_ref(value), json, value)
 }
 
-/// Prints a line of JSON for each of `values`, or `text`.
 pub fn print_rows(values: &[impl Serialize], json: bool, text: impl Display) -> Result {
     if json { print_text(json_lines(values)?) } else { print_text(text) }
 }

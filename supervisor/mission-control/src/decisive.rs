@@ -11,7 +11,6 @@ use crate::{
     outcome::{Ending, Outcome},
 };
 
-/// Returns the first contact that ends `mission`.
 pub(crate) fn first_contact<'a>(
     truth: &'a [GroundTruthTick],
     mission: &Mission,

@@ -236,7 +236,7 @@ impl Record {
         self.contacts.iter().any(is_new)
     }
 
-    /// Iterates over the ticks after `last` with both pose and guidance, oldest first.
+    /// With both pose and guidance, oldest first.
     pub(crate) fn ticks_since(
         &self,
         last: Option<u64>,

@@ -289,7 +289,6 @@ fn told(mut teller: Child) -> Result {
     }
 }
 
-/// Waits until `rests` accepts a link sample.
 fn await_rest(robot: &RobotName, rests: impl Fn(&LinkSample) -> bool) -> Result {
     let bus = roster::join(&robot.domain(), "operator")?;
     let mut links = bus.reader(&topics::LINK)?;
@@ -353,7 +352,7 @@ pub fn restart(robot: &RobotName, stage: &str) -> Result {
     ask(robot, RequestSample { stage: name(stage), ..request(RequestKind::Restart) })
 }
 
-/// Sends the robot to `points` in turn: now, or after its present targets if `appends`.
+/// Now, or after its present targets if `appends`.
 pub fn send_to(robot: &RobotName, points: &[TargetPoint], appends: bool) -> Result {
     let kind = if appends { RequestKind::Append } else { RequestKind::Goto };
     ask_with(robot, request(kind), points)
@@ -374,7 +373,7 @@ pub fn drive_by_hand(robot: &RobotName, stick: DVec2) -> Result {
     ask_with(robot, request(RequestKind::Hand), &[TargetPoint::at(stick)])
 }
 
-/// Follows the beacon at `distance_m` (0: the robot's default).
+/// `distance_m` 0 is the robot's default.
 pub fn follow(robot: &RobotName, distance_m: f64) -> Result {
     ask(robot, RequestSample { deviations: [distance_m, 0.0], ..request(RequestKind::Follow) })
 }

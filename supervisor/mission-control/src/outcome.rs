@@ -1,5 +1,3 @@
-//! Endings of runs.
-
 use common::{ground_truth::GroundTruthTick, mission::Mission, samples::PoseSample};
 use glam::DVec2;
 use serde::{Deserialize, Serialize};

@@ -189,7 +189,6 @@ pub(crate) fn conduct<'a>(
     Ok((finished, (wheels == Wheels::Turning).then_some(supervisor)))
 }
 
-/// Conducts a run on a simulated machine.
 pub fn simulate(
     options: &Options,
     surroundings: &mut dyn Surroundings,

@@ -45,7 +45,7 @@ impl RunClock {
         matches!(self.clock, MissionClock::Ticks { .. })
     }
 
-    /// Returns the tick at mission time `at_ns`; `None` in wall-clock time.
+    /// `None` in wall-clock time.
     pub(crate) fn tick_at(&self, at_ns: u64) -> Option<u64> {
         match self.clock {
             MissionClock::Ticks { period_ns } => at_ns.checked_div(period_ns),
@@ -53,8 +53,7 @@ impl RunClock {
         }
     }
 
-    /// Returns the first tick of a new generation of a stage; `newest` is the newest tick of any
-    /// sample.
+    /// `newest` is the newest tick of any sample.
     pub(crate) fn first_tick(&self, newest: Option<u64>) -> u64 {
         // The link publishes tick 0 before its first tick.
         newest.map_or(0, |tick| tick + 1).max(self.first_tick)
@@ -84,7 +83,7 @@ impl RunClock {
         last.map_or(0.0, |last| last.since(first).as_secs_f64())
     }
 
-    /// Returns the mission time now; `truth` is the newest ground truth.
+    /// `truth` is the newest ground truth.
     pub(crate) fn now(
         &self,
         pose: Option<&PoseSample>,

@@ -24,11 +24,10 @@ use crate::{
     supervisor::Options,
 };
 
-/// A simulated robot, as its supervisor sees it.
 pub trait SimulatedRobot {
     fn truth(&self) -> &[GroundTruthTick];
 
-    /// Reads new ground truth. Returns whether the robot still runs.
+    /// Returns whether the robot still runs.
     fn poll(&mut self) -> Result<bool, SimulatorError>;
 
     /// Ends the robot, which comes to rest, and keeps the ground truth.
@@ -41,7 +40,6 @@ pub trait SimulatedRobot {
     }
 }
 
-/// Robot of a run: simulated, or at its address.
 pub struct Robot {
     pub simulator: Option<Box<dyn SimulatedRobot>>,
     pub address: Address,
@@ -56,7 +54,7 @@ impl Robot {
         Ok(self.simulator.as_mut().map_or(Ok(true), |simulator| simulator.poll())?)
     }
 
-    /// Returns the robot at the mission's address, if it states one.
+    /// `None` if it states none.
     pub fn at_address(mission: &Mission) -> Result<Option<Self>> {
         let Some(address) = &mission.robot.address else { return Ok(None) };
         let address = address.parse::<Address<String>>()?.resolve()?;
@@ -84,7 +82,7 @@ pub trait Surroundings {
         None
     }
 
-    /// Starts the consumer of all samples, after the bus and before the stages.
+    /// After the bus and before the stages.
     fn attach_consumer(&mut self) {}
 
     /// Waits until the consumer has read all samples.
@@ -95,7 +93,6 @@ pub trait Surroundings {
         Ok(())
     }
 
-    /// Restores removed files of the robot.
     fn restore(&mut self) {}
 }
 

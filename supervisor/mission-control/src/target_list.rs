@@ -23,7 +23,7 @@ pub enum TargetOutcome {
     Reached,
     /// The ground truth contradicts the reported arrival.
     WrongPlace,
-    /// The robot is unsure of its reported arrival, as in [`Outcome::ReachedUnsure`].
+    /// As [`Outcome::ReachedUnsure`].
     ReachedUnsure,
     /// An operator named another target first.
     Replaced,
@@ -122,7 +122,7 @@ impl TargetList {
         self.waits = false;
     }
 
-    /// Ends the following at `now_s`, with the beacon last seen at `place`.
+    /// The beacon was last seen at `place`.
     pub(crate) fn end_following(
         &mut self,
         (outcome, followed): (TargetOutcome, Followed),
@@ -206,8 +206,7 @@ impl TargetList {
         }
     }
 
-    /// Ends the current target with `outcome` at `now_s`; later ones are not tried. The robot
-    /// waits.
+    /// Later targets are not tried. The robot waits.
     pub(crate) fn settle(&mut self, outcome: Outcome, now_s: f64, arrival: Option<Arrived>) {
         if self.release() {
             return;
@@ -305,7 +304,7 @@ impl TargetList {
         }
     }
 
-    /// Returns all results of a run; `ended` is the final ground truth.
+    /// `ended` is the final ground truth.
     pub(crate) fn results(
         &self,
         ending: &Ending,

@@ -1,5 +1,3 @@
-//! Set-ups of the tests.
-
 use common::mission::Mission;
 
 pub(crate) fn mission(text: &str) -> Mission {

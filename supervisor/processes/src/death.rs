@@ -43,7 +43,6 @@ pub enum Next {
 }
 
 impl Death {
-    /// Returns whether the bus refused the process.
     pub fn was_refused(&self) -> bool {
         self.cause == ExitCause::Exited(start::REFUSED.into())
     }

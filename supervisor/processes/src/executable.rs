@@ -5,8 +5,7 @@ use std::{
 
 use rustix::fs::{Access, access};
 
-/// Returns the absolute path of `named`: a path, or a plain name beside this executable or on
-/// `PATH`.
+/// `named` is a path, or a plain name beside this executable or on `PATH`.
 pub fn find(named: &Path) -> io::Result<PathBuf> {
     let has_slash = named.as_os_str().as_encoded_bytes().contains(&b'/');
     let is_name = named.components().count() == 1 && !has_slash;

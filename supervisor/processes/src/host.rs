@@ -49,7 +49,7 @@ pub trait Watched {
 }
 
 pub trait Host {
-    /// Starts a stage's process. A mission may name another `executable`.
+    /// A mission may name another `executable`.
     fn start(
         &mut self,
         executable: Option<&Path>,

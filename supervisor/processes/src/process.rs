@@ -29,7 +29,7 @@ pub fn firsthand(arguments: &[&str]) -> Command {
     command
 }
 
-/// Returns the command of a stage's `generation`. A mission may name another `executable`.
+/// A mission may name another `executable`.
 pub fn stage(executable: Option<&Path>, generation: &Generation) -> Command {
     let (program, called) = program_of(executable, generation.stage);
     let mut command = child(program);
@@ -114,7 +114,7 @@ impl ExitCause {
 }
 
 impl Process {
-    /// Starts `command`. The process inherits only the standard descriptors.
+    /// The process inherits only the standard descriptors.
     pub fn spawn(mut command: Command) -> io::Result<Self> {
         close_all_on_exec()?;
         let mut child = command.spawn()?;

@@ -56,7 +56,7 @@ impl ServiceManager {
     }
 }
 
-/// Sends a notification. Failures never stop the robot.
+/// Failures never stop the robot.
 fn notify(states: &[NotifyState<'_>]) {
     if let Err(error) = sd_notify::notify(states) {
         tracing::debug!(%error, "systemd does not listen");

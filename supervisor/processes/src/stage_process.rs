@@ -45,7 +45,7 @@ pub(crate) struct StageProcess {
     hung: Option<Now>,
     /// Whether the last beat announced a stop on request.
     pub stopping: bool,
-    /// Whether the previous iteration found the process ended.
+    /// In the previous iteration.
     found_ended: bool,
 }
 

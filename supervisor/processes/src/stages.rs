@@ -27,7 +27,6 @@ pub struct Stage {
     pub per_million_cells: Duration,
     pub while_down: &'static str,
     pub run: fn(&Start) -> Result<(), StageError>,
-    /// Starts the stage's process on a simulated machine.
     pub simulate: fn(Generation, Run, Bus) -> start::Result<Box<dyn Simulated>>,
     pub replay: Begin,
 }
@@ -62,7 +61,7 @@ impl Stage {
         Self::new::<Answers<A>>(replay::<A>, while_down)
     }
 
-    /// Returns the executable of this stage in `mission`; `None` for `firsthand`'s own.
+    /// `None` for `firsthand`'s own.
     pub fn executable<'mission>(&self, mission: &'mission Mission) -> Option<&'mission Path> {
         let named = mission.planner.executable.as_deref();
         named.filter(|_| self.name == PLANNER)
@@ -136,8 +135,7 @@ pub fn unknown(name: &str) -> String {
     format!("no stage is called {name:?}; the stages are {names}")
 }
 
-/// Returns the stages in start order, each after the writers of its inputs. They stop in reverse
-/// order.
+/// Each after the writers of its inputs. They stop in reverse order.
 pub fn start_order() -> Vec<&'static Stage> {
     let mut order: Vec<&'static Stage> = Vec::with_capacity(TABLE.len());
     while order.len() < TABLE.len() {

@@ -1,5 +1,3 @@
-//! Names of recordings.
-
 use std::{
     collections::BTreeMap,
     fs,
@@ -8,7 +6,7 @@ use std::{
 
 use crate::{RecordingError, Result};
 
-/// Returns the name of recording `number`: `F.mcap`, `F-2.mcap`, ...
+/// `F.mcap`, `F-2.mcap`, ...
 pub(crate) fn numbered(out: &Path, number: u32) -> PathBuf {
     if number <= 1 {
         return out.to_path_buf();

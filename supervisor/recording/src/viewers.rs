@@ -326,7 +326,7 @@ fn laser_scan(
         .numbers(6, ranges)
 }
 
-/// Returns the message of [`LOG`] for a log line of `process`, read at `now_ns` since 1970.
+/// `line` was read at `now_ns` since 1970.
 pub fn log(process: &str, line: &str, now_ns: u64) -> Vec<u8> {
     Message::default()
         .part(1, &time(now_ns))

@@ -40,7 +40,6 @@ pub struct RobotState {
     pub field: Replica<FieldCell>,
     pub field_header: FieldHeader,
     pub target: Option<TargetSample>,
-    /// State of the newest following.
     pub following: Option<FollowingSample>,
     pub guidance: Option<GuidanceSample>,
     pub command: Option<CommandSample>,
@@ -48,7 +47,6 @@ pub struct RobotState {
     /// Newest complaint, repeated by its stage while it lasts.
     complaint: Option<ComplaintSample>,
     pub power: Option<PowerSample>,
-    /// Age of the data of a mirrored robot.
     pub mirror: Option<MirrorSample>,
     pub deaths: BTreeMap<String, DeathSample>,
     pub stalls: u64,
@@ -133,7 +131,7 @@ impl RobotState {
         self.events.drain()
     }
 
-    /// Returns the mission time of the newest pose, seconds.
+    /// By the newest pose.
     pub const fn now_s(&self) -> f64 {
         self.events.now_s
     }

@@ -36,7 +36,7 @@ fn page(mut whole: Command) -> io::Result<Vec<u8>> {
     Ok(page)
 }
 
-/// Adds subcommands recursively, with `names` as the preceding words.
+/// `names` are the preceding words.
 fn add_subcommands(command: &Command, names: &str, page: &mut Vec<u8>) -> io::Result<()> {
     for subcommand in command.get_subcommands().filter(|it| !it.is_hide_set()) {
         let names = format!("{names}{}", subcommand.get_name().to_uppercase());

@@ -1,5 +1,3 @@
-//! Result of a replay.
-
 use std::{collections::BTreeMap, fmt};
 
 use serde::Serialize;

@@ -7,7 +7,6 @@ use thiserror::Error;
 
 use super::map::MOST_BOXES;
 
-/// Map file that is invalid, or cannot be read or written.
 #[derive(Debug, Error)]
 #[error("{}: {problem}", file.display())]
 pub struct MapError {

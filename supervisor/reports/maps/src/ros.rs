@@ -142,7 +142,6 @@ impl Keys {
         self.scalar(key)?.map(number).transpose()
     }
 
-    /// Returns the image that the map `file` names.
     fn image(&self, file: &Path) -> Result<(PathBuf, Lightness), String> {
         let image = self.scalar("image")?.ok_or_else(|| missing("image: FILE"))?;
         let folder = file.parent().unwrap_or(Path::new(""));

@@ -1,5 +1,3 @@
-//! Recorded run as one file: page, styles, modules and messages.
-
 use std::io::Write as _;
 
 use base64::prelude::{BASE64_STANDARD, Engine as _};

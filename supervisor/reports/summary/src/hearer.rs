@@ -117,7 +117,6 @@ impl Hearer {
         before.map(|(_, count)| count).sum::<u64>() + last.full_solves
     }
 
-    /// In rad/s.
     pub fn wheel_range_rad_s(&self, tick: u64) -> Option<f64> {
         self.wheels.at(tick).range_rad_s()
     }

@@ -241,7 +241,6 @@ impl fmt::Display for Summary {
     }
 }
 
-/// Returns the time at which the robot had left its start.
 pub fn departed_s(mission: &Mission, truth: &[GroundTruthTick]) -> Option<f64> {
     let start = mission.start.at;
     let has_left = |tick: &&GroundTruthTick| start.distance(tick.pose().position) >= DEPARTED_M;

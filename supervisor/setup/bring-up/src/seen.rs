@@ -57,7 +57,6 @@ impl Seen {
         }
     }
 
-    /// Returns whether the answers follow the protocol.
     pub fn is_known(&self) -> bool {
         self.ticks.0 > 0 || !self.words.is_empty()
     }

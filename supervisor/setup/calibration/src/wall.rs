@@ -234,7 +234,7 @@ impl Wall {
         }
     }
 
-    /// Ends the sweep at the `nominal` heading; a wall found completes the loop.
+    /// A wall found completes the loop.
     fn end_sweep(&mut self, nominal: f64, body: &Body) {
         self.sweeps += 1;
         let normal = match normal(&self.legs) {

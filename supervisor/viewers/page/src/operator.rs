@@ -1,5 +1,3 @@
-//! Execution of an operator's orders.
-
 use common::{domain::RobotName, samples::TargetPoint};
 use console::{
     failure::Result,

@@ -62,7 +62,6 @@ pub struct Server {
 }
 
 impl Server {
-    /// Fails on a malformed payload.
     pub fn read_goal(payload: &[u8]) -> Result<(Uuid, Result<TargetPoint, Refusal>), Malformed> {
         let NavigateToPoseSendGoalRequest { goal_id, goal } = Cdr::decode(payload)?;
         Ok((goal_id.uuid, goal_of(&goal.pose.header, &goal.pose.pose)))

@@ -91,7 +91,6 @@ fn value(option: &Arg, matches: &ArgMatches) -> Option<ParameterValue> {
     Some(value)
 }
 
-/// Returns the reply to a request. Fails on a malformed payload.
 pub fn reply(
     parameters: &[Parameter],
     service: Service,

@@ -1,4 +1,3 @@
-//! Tests of the screen, drawn into memory.
 #![allow(clippy::unwrap_used)]
 
 use std::f64::consts::FRAC_PI_2;

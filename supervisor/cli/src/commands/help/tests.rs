@@ -62,7 +62,7 @@ impl Document {
         code
     }
 
-    /// Returns the link targets, as paths from the root.
+    /// As paths from the root.
     fn links(&self) -> Vec<PathBuf> {
         let targets = self.text.split("](").skip(1).map(|rest| rest.split(')').next().unwrap());
         let files = targets
@@ -109,7 +109,6 @@ fn filled_in(word: &str) -> String {
     parts.collect()
 }
 
-/// Returns the arguments of a `firsthand` command.
 fn arguments(command: &[String]) -> Option<&[String]> {
     let words: Vec<&str> = command.iter().map(String::as_str).collect();
     let at = match words.as_slice() {

@@ -84,7 +84,6 @@ pub fn main(arguments: &Arguments) -> Result {
     Err(refused.into())
 }
 
-/// Returns the answer in the stage's heartbeats.
 fn request_fault(bus: &Bus, stage: &str, request: FaultSample) -> Result<Option<FaultAnswer>> {
     let mut health = bus.reader(&topics::HEALTH)?;
     let mut waiter = Waiter::default();

@@ -119,7 +119,6 @@ fn renewed(text: &str, print: impl Fn(&str, Option<&str>) -> String) -> String {
     renewed
 }
 
-/// Returns whether a line can be part of a printed table or list.
 fn is_of_a_table(line: &str) -> bool {
     ["- ", "  ", "|"].iter().any(|start| line.starts_with(start))
 }
@@ -178,7 +177,6 @@ fn documents_show_the_tables_that_are_printed() {
     }
 }
 
-/// Lists the workspace's crates with their descriptions.
 fn crates() -> String {
     let manifest = |folder: &Path| -> toml::Table {
         let text = fs::read_to_string(folder.join("Cargo.toml")).unwrap();
