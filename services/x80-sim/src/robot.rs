@@ -473,35 +473,36 @@ impl Robot {
         }
     }
 
-    /// Appends a frame of every running stream, the motor frame last, and counts them.
-    pub fn stream(&mut self, out: &mut Vec<u8>) {
+    /// Returns a frame of every running stream, the motor frame last, and counts them.
+    pub fn stream(&mut self) -> Vec<u8> {
         let due = self.streams.take_due();
-        self.write(due, out);
+        self.written(due)
     }
 
     /// Frames are not counted again.
-    pub fn repeat(&self, out: &mut Vec<u8>) {
-        self.write(self.streams.running(), out);
+    pub fn repeat(&self) -> Vec<u8> {
+        self.written(self.streams.running())
     }
 
-    fn write(&self, due: [bool; 3], out: &mut Vec<u8>) {
+    fn written(&self, due: [bool; 3]) -> Vec<u8> {
         if let Some(json) = &self.json {
             let sensors = (&self.standard, &self.custom, &self.motor);
             let touched = self.touches.iter().map(|row| row.name.clone()).zip(self.told.clone());
             let touched = touched.collect();
             let gyro = self.gyro.as_ref().map(|gyro| gyro.angle);
-            out.extend(json.report(sensors, &self.lasers, touched, &self.motors, gyro));
-            return;
+            return json.report(sensors, &self.lasers, touched, &self.motors, gyro);
         }
+        let mut out = Vec::with_capacity(256);
         if self.arduino.is_some() {
             // This robot only answers requests.
-            return;
+            return out;
         }
         let standard = Report::Standard(self.standard);
         let reports = [standard, Report::Custom(self.custom), Report::Motor(self.motor)];
         for (report, _) in reports.iter().zip(due).filter(|(_, is_due)| *is_due) {
-            report.encode(self.addressing, out);
+            report.encode(self.addressing, &mut out);
         }
+        out
     }
 
     pub fn ground_truth(&mut self) -> GroundTruthTick {

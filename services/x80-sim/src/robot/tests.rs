@@ -35,10 +35,8 @@ fn forward(counts: i16, limit_ms: impl Into<Option<u16>>) -> Command {
 
 /// Returns this tick's frames: RIDs and DIDs, and the reports.
 fn streamed(robot: &mut Robot) -> (Vec<(u8, u8)>, Vec<Report>) {
-    let mut bytes = Vec::new();
-    robot.stream(&mut bytes);
     let mut decoder = Decoder::default();
-    decoder.push(&bytes);
+    decoder.push(&robot.stream());
     let (mut ids, mut reports) = (Vec::new(), Vec::new());
     while let Some(frame) = decoder.next_frame() {
         ids.push((frame.rid, frame.did));
@@ -331,9 +329,7 @@ fn kobuki(world: &str, wheels: [f64; 2]) -> Vec<common::json_wire::Report> {
         let drive = Order::Drive { wheels, twist: [0.0; 2], for_s: 0.5 };
         robot.on_order(&drive, &mut Vec::new());
         robot.advance_to_next_tick();
-        let mut line = Vec::new();
-        robot.stream(&mut line);
-        common::json_wire::parse(&line).unwrap()
+        common::json_wire::parse(&robot.stream()).unwrap()
     };
     (0..20).map(said).collect()
 }

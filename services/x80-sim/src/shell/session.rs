@@ -286,9 +286,7 @@ impl Session {
         self.send_measured();
         self.write_tick();
         self.save()?;
-        let mut frames = Vec::with_capacity(256);
-        self.robot.stream(&mut frames);
-        Ok(frames)
+        Ok(self.robot.stream())
     }
 
     fn hear(&mut self, source: Source, bytes: &[u8]) -> Result {
@@ -360,11 +358,7 @@ impl Session {
         self.deliver(&answer);
         match kind {
             Heard::Motion => self.tick_until_heard()?,
-            Heard::Ping => {
-                let mut frames = Vec::with_capacity(256);
-                self.robot.repeat(&mut frames);
-                self.deliver(&frames);
-            }
+            Heard::Ping => self.deliver(&self.robot.repeat()),
             _ => {}
         }
         Ok(())
