@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use serde::{Deserialize, Serialize, Serializer, ser::SerializeStruct as _};
+use serde::{Deserialize, Serialize, Serializer};
 
 use super::{
     localisation::BeaconRefusal,
@@ -298,17 +298,22 @@ payloads! {
 
 impl Serialize for StallSample {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        let mut line = to.serialize_struct("Stall", 9)?;
-        line.serialize_field("tick", &self.stamp.tick)?;
-        line.serialize_field("time_s", &self.stamp.seconds())?;
-        line.serialize_field("x_m", &self.x_m)?;
-        line.serialize_field("y_m", &self.y_m)?;
-        line.serialize_field("cause", &self.cause())?;
-        line.serialize_field("recovery", &self.recovery())?;
-        line.serialize_field("epoch", &self.epoch)?;
-        line.serialize_field("replans", &self.replans)?;
-        line.serialize_field("resets", &self.resets)?;
-        line.end()
+        #[derive(Serialize)]
+        struct Stall {
+            tick: u64,
+            time_s: f64,
+            x_m: f64,
+            y_m: f64,
+            cause: StallCause,
+            recovery: RecoveryStep,
+            epoch: u64,
+            replans: u32,
+            resets: u64,
+        }
+        let Self { stamp, x_m, y_m, epoch, replans, resets, .. } = *self;
+        let (tick, time_s, cause, recovery) =
+            (stamp.tick, stamp.seconds(), self.cause(), self.recovery());
+        Stall { tick, time_s, x_m, y_m, cause, recovery, epoch, replans, resets }.serialize(to)
     }
 }
 
