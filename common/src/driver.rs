@@ -102,8 +102,12 @@ pub struct WireTally {
 
 impl Heard {
     pub fn take_battery(&mut self, volts: f64) {
-        let (board_v, motor_v, servo_v) = (volts, volts, volts);
-        self.power = Some(PowerSample { board_v, motor_v, servo_v, ..PowerSample::default() });
+        self.power = Some(PowerSample {
+            board_v: volts,
+            motor_v: volts,
+            servo_v: volts,
+            ..PowerSample::default()
+        });
     }
 }
 

@@ -110,17 +110,14 @@ fn is_start(pose: Pose2) -> bool {
 /// blocked wheels.
 pub fn motion(body: &Body, turned: [f64; 2], speeds: [f64; 2], held: [bool; 2]) -> Motion {
     let counts = |angle: f64| (angle * body.counts_per_turn / TAU).round();
-    let [left, right] = turned.map(|angle| counts(angle).clamp(-MOST_COUNTS, MOST_COUNTS));
+    let [left_counts, right_counts] =
+        turned.map(|angle| counts(angle).clamp(-MOST_COUNTS, MOST_COUNTS));
     Motion {
         wheels: wheel_sample(
-            WheelCounts::Endless([left, right]).cyclic(),
+            WheelCounts::Endless([left_counts, right_counts]).cyclic(),
             speeds.map(|speed| counts(speed) as i32),
         ),
-        endless: Some(CountsSample {
-            left_counts: left,
-            right_counts: right,
-            ..CountsSample::default()
-        }),
+        endless: Some(CountsSample { left_counts, right_counts, ..CountsSample::default() }),
         stamp_ns: None,
         // A blocked wheel draws its motor's full current.
         currents: held.map(|held| if held { HELD_AD } else { 0 }),
