@@ -27,7 +27,7 @@ trait Wire {
     fn address(&self) -> String;
 
     /// Becomes readable when bytes have come.
-    fn readable(&self) -> [Option<BorrowedFd<'_>>; 2];
+    fn readable(&self) -> Vec<BorrowedFd<'_>>;
 
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<(Source, usize)>>;
 
@@ -75,8 +75,8 @@ impl Way {
         self.0.address()
     }
 
-    pub(crate) fn readable(&self) -> impl Iterator<Item = BorrowedFd<'_>> {
-        self.0.readable().into_iter().flatten()
+    pub(crate) fn readable(&self) -> Vec<BorrowedFd<'_>> {
+        self.0.readable()
     }
 
     pub(crate) fn take_opened(&mut self) -> bool {

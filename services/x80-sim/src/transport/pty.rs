@@ -65,8 +65,8 @@ impl Wire for Pty {
         self.path.clone()
     }
 
-    fn readable(&self) -> [Option<BorrowedFd<'_>>; 2] {
-        [Some(self.robot.as_fd()), None]
+    fn readable(&self) -> Vec<BorrowedFd<'_>> {
+        vec![self.robot.as_fd()]
     }
 
     fn connected(&mut self) -> io::Result<Option<Source>> {

@@ -59,9 +59,10 @@ impl Wire for Tcp {
         self.address.to_string()
     }
 
-    fn readable(&self) -> [Option<BorrowedFd<'_>>; 2] {
-        let connection = self.connection.as_ref().map(AsFd::as_fd);
-        [Some(self.listener.as_fd()), connection]
+    fn readable(&self) -> Vec<BorrowedFd<'_>> {
+        let mut both = vec![self.listener.as_fd()];
+        both.extend(self.connection.as_ref().map(AsFd::as_fd));
+        both
     }
 
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<(Source, usize)>> {

@@ -32,8 +32,8 @@ impl Wire for Udp {
         self.address.to_string()
     }
 
-    fn readable(&self) -> [Option<BorrowedFd<'_>>; 2] {
-        [Some(self.socket.as_fd()), None]
+    fn readable(&self) -> Vec<BorrowedFd<'_>> {
+        vec![self.socket.as_fd()]
     }
 
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<(Source, usize)>> {
