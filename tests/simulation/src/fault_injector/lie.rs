@@ -118,6 +118,7 @@ impl Lie {
 
     /// Draws the lie of the mission's seed.
     pub fn draw(mission: &Mission) -> Self {
+        use Stream::*;
         let single = |sensor: &&Sensor| sensor.kind != SensorKind::Scan;
         let ranges = match mission.robot.protocol() {
             Protocol::X80 => 3,
@@ -125,12 +126,12 @@ impl Lie {
         };
         let mut chance = Random::new(mission.seed, 31);
         let [wheel, one] = [2, ranges].map(|of| chance.below(of));
-        let mut streams = vec![Stream::Wheel(wheel), Stream::Wheels, Stream::AllRanges];
+        let mut streams = vec![Wheel(wheel), Wheels, AllRanges];
         if mission.robot.gyro() {
-            streams.push(Stream::Gyro);
+            streams.push(Gyro);
         }
         if ranges > 1 {
-            streams.extend([Stream::Range(0), Stream::Range(one), Stream::HalfOfRanges(wheel)]);
+            streams.extend([Range(0), Range(one), HalfOfRanges(wheel)]);
         }
         let stream = streams[chance.below(streams.len())];
         Self::new(stream, Change::draw(stream, &mut chance), mission.seed)
@@ -138,10 +139,11 @@ impl Lie {
 
     /// Changes `report`. `before` holds the newest values from before the lie.
     pub(crate) fn change(&mut self, report: &mut Report, before: &Report, now: Duration) {
+        use Stream::*;
         let stream = self.stream;
         match stream {
-            Stream::Wheel(_) | Stream::Wheels => return self.miscount(report, before, now),
-            Stream::Gyro => {
+            Wheel(_) | Wheels => return self.miscount(report, before, now),
+            Gyro => {
                 if let Some(gyro) = &mut report.gyro {
                     *gyro = self.told(0, (*gyro, before.gyro), now).unwrap_or(*gyro);
                 }
@@ -150,8 +152,8 @@ impl Lie {
             _ => {}
         }
         let lies = |number: usize| match stream {
-            Stream::Range(one) => one == number,
-            Stream::HalfOfRanges(from) => number % 2 == from,
+            Range(one) => one == number,
+            HalfOfRanges(from) => number % 2 == from,
             _ => true,
         };
         for (number, (name, range)) in report.ranges.iter_mut().enumerate() {
@@ -160,7 +162,7 @@ impl Lie {
                 *range = self.read(number, *range, Some(before), now);
             }
         }
-        if stream == Stream::AllRanges {
+        if stream == AllRanges {
             let before_of = |name| Some(&before.scans.get(name)?.ranges);
             let named =
                 report.scans.iter_mut().map(|(name, scan)| (before_of(name), &mut scan.ranges));
