@@ -86,8 +86,10 @@ pub(crate) fn enter(domain: &Domain) -> Result<File> {
     domain.enter().map_err(system("enter the robot's directory"))
 }
 
-pub(crate) fn system(action: &'static str) -> impl FnOnce(std::io::Error) -> StageError {
-    move |source| StageError::System { action, source }
+pub(crate) fn system<E: Into<std::io::Error>>(
+    action: &'static str,
+) -> impl FnOnce(E) -> StageError {
+    move |source: E| StageError::System { action, source: source.into() }
 }
 
 /// Sets the name for `ps` and `pkill`, and requests SIGTERM at the end of `supervisor`.
@@ -97,7 +99,7 @@ pub(crate) fn system(action: &'static str) -> impl FnOnce(std::io::Error) -> Sta
 pub fn become_child(process_name: &str, supervisor: u32) -> Result {
     name_process(process_name)?;
     rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::TERM))
-        .map_err(|errno| system("tie the process to its supervisor")(errno.into()))?;
+        .map_err(system("tie the process to its supervisor"))?;
     // The supervisor may have ended before that took effect.
     let parent = rustix::process::getppid().map_or(0, |pid| pid.as_raw_nonzero().get() as u32);
     if parent == supervisor {
@@ -112,8 +114,7 @@ pub fn become_child(process_name: &str, supervisor: u32) -> Result {
 pub(crate) fn name_process(name: &str) -> Result {
     // The table has no name with a zero byte.
     if let Ok(name) = std::ffi::CString::new(name) {
-        rustix::thread::set_name(&name)
-            .map_err(|errno| system("name the process")(errno.into()))?;
+        rustix::thread::set_name(&name).map_err(system("name the process"))?;
     }
     Ok(())
 }

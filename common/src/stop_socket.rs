@@ -206,21 +206,19 @@ impl Identity {
 
 /// Mark of an operator's stop in a run's directory, for a new link.
 #[derive(Debug)]
-pub struct StopMark {
-    path: PathBuf,
-}
+pub struct StopMark(PathBuf);
 
 impl StopMark {
     pub fn of(directory: &Path) -> Self {
-        Self { path: directory.join("operator-stop") }
+        Self(directory.join("operator-stop"))
     }
 
     pub fn is_set(&self) -> bool {
-        file::exists(&self.path)
+        file::exists(&self.0)
     }
 
     pub fn set(&self, stopped: bool) -> io::Result<()> {
-        if stopped { file::create(&self.path) } else { file::remove(&self.path) }
+        if stopped { file::create(&self.0) } else { file::remove(&self.0) }
     }
 }
 
