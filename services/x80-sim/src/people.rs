@@ -125,10 +125,10 @@ impl Walker {
         let mut before: Vec<DVec2> = Vec::new();
         for Other { at, velocity, radius } in others {
             let both_m = radius + self.person.radius_m;
-            let repelled = by_another(self.at - at, STEP_S * velocity, both_m);
+            let offset = self.at - at;
+            let repelled = by_another(offset, STEP_S * velocity, both_m);
             let sees = wants.dot(-repelled) >= repelled.length() * SEES_RAD.cos();
             force += if sees { repelled } else { UNSEEN * repelled };
-            let offset = self.at - at;
             before.extend((offset.length() < both_m + KEPT_M).then(|| offset.normalize_or_zero()));
         }
         for Solid { surface, .. } in standing {
