@@ -254,8 +254,9 @@ impl SimulatedMachine {
     /// Returns how the process ended, if it did, and forgets it.
     pub(crate) fn reap(&self, process: u32) -> Option<ExitCause> {
         let mut processes = self.processes.borrow_mut();
-        let ended = processes.get(&process).is_some_and(|process| !process.is_live());
-        ended.then(|| processes.remove(&process)).flatten()?.exit
+        let exit = processes.get_mut(&process)?.exit.take()?;
+        processes.remove(&process);
+        Some(exit)
     }
 
     /// Returns the activity of a live process since its start.
