@@ -142,13 +142,10 @@ impl Evidential {
         }
         // Scans and rays come first, because they explain echoes.
         for (row, fan) in scans {
-            let laser = self.lasers.iter().position(|laser| *laser == row);
-            match laser {
+            match self.lasers.iter().position(|laser| *laser == row) {
                 Some(0) => map.evidence.take_scan(&fan, robot, None),
                 Some(further) => {
-                    if let Some(grid) = map.others.get_mut(further - 1) {
-                        grid.take_scan(&fan, robot, Some(&map.evidence));
-                    }
+                    map.others[further - 1].take_scan(&fan, robot, Some(&map.evidence));
                 }
                 None => {}
             }
