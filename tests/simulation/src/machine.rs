@@ -242,10 +242,9 @@ impl SimulatedMachine {
             return;
         };
         match signal {
-            Signal::KILL => self.end(process, killed_by(signal)),
-            // A stopped process takes no other signal.
-            _ if process.frozen => {}
-            Signal::ABORT => self.end(process, killed_by(signal)),
+            // A stopped process takes no other signal than SIGKILL.
+            _ if process.frozen && signal != Signal::KILL => {}
+            Signal::KILL | Signal::ABORT => self.end(process, killed_by(signal)),
             Signal::TERM if process.turns.is_none() => self.end(process, killed_by(signal)),
             _ => (process.is_terminated, process.due_ns) = (true, self.monotonic_ns()),
         }
