@@ -86,7 +86,7 @@ pub fn mission(log: &Log, robot: Option<&str>) -> Result<Mission, MissionError> 
         field_of_view_deg = 180\nreach_m = 30\nbeams = {beams}\n"
     );
     let [x, y] = centre.to_array();
-    let target = places().last().unwrap_or_default();
+    let target = places().next_back().unwrap_or_default();
     let text = format!(
         "target = [{:.3}, {:.3}]\nperimeter.width_m = {width_m:.1}\nperimeter.centre = [{x:.1}, {y:.1}]\n{}",
         target.x,
