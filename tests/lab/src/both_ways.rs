@@ -15,7 +15,11 @@ use std::{
 
 use clap::Args;
 use common::{ground_truth::GROUND_TRUTH, mission::Waypoint, poll};
-use console::{missions, output::print_line, runs};
+use console::{
+    missions,
+    output::{json_lines, print_line},
+    runs,
+};
 use mission_control::recovery::SUMMARY;
 use recording::Recording;
 use rustix::process::Signal;
@@ -86,12 +90,9 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     let all = found.trials.len();
     let began = Instant::now();
     let mut differ = 0;
-    let drive = |trial: &Trial, thread| {
-        let job = Job { arguments, directory, trial, thread };
-        let compared = job.compare().map_err(|error| error.to_string());
-        (trial.mission.name.clone(), compared)
-    };
-    in_parallel(found.trials, arguments.jobs, drive, |(world, compared)| {
+    let drive = |trial: &Trial, thread| Job { arguments, directory, trial, thread }.compare();
+    in_parallel(found.trials, arguments.jobs, drive, |trial, compared| {
+        let world = trial.mission.name;
         if let Some(difference) = compared.map_err(|error| format!("{world}: {error}"))? {
             differ += 1;
             print_line(format!("{world}: {difference}"))?;
@@ -132,9 +133,12 @@ impl Job<'_> {
         let many = self.through_processes(&file, &directory.join(PROCESSES), sent_to)?;
         let mut difference = one.difference(&many);
         if difference.is_none() {
+            // What follows the event that decided the mission depends on how soon the supervisor
+            // sees it.
+            let ticks = one.summary["ticks"].as_u64().unwrap_or_default();
             let one_process = Recording::open(&directory.join(ONE_PROCESS))?;
             let processes = Recording::open(&directory.join(PROCESSES))?;
-            difference = recordings::difference([&one_process, &processes], one.ticks())?;
+            difference = recordings::difference([&one_process, &processes], ticks)?;
         }
         if difference.is_none() && self.arguments.out.is_none() {
             let _ = fs::remove_dir_all(&directory);
@@ -154,8 +158,8 @@ impl Job<'_> {
         let ran = simulate::record(&scenario, &directory.join(ONE_PROCESS))?;
         let broken = ran.broken.map_or(String::new(), |broken| broken.to_string());
         let (finished, summary) = ran.finished.zip(ran.summary).ok_or(broken)?;
-        let lines: Result<_, _> = finished.truth.iter().map(serde_json::to_string).collect();
-        Ok(Way { summary: numbers(&serde_json::to_string(&summary)?)?, truth: lines? })
+        let summary = numbers(&serde_json::to_string(&summary)?)?;
+        Ok(Way { summary, truth: json_lines(&finished.truth)? })
     }
 
     fn through_processes(
@@ -187,8 +191,7 @@ impl Job<'_> {
             let file = directory.join(name);
             fs::read_to_string(&file).or_cannot_file("read", &file)
         };
-        let truth = read(GROUND_TRUTH)?.lines().map(str::to_owned).collect();
-        Ok(Way { summary: numbers(&read(SUMMARY)?)?, truth })
+        Ok(Way { summary: numbers(&read(SUMMARY)?)?, truth: read(GROUND_TRUTH)? })
     }
 }
 
@@ -200,40 +203,32 @@ fn send(robot: &str, place: [f64; 2]) -> bool {
 }
 
 /// Returns a summary without what a machine's clock and load decide.
-fn numbers(summary: &str) -> Result<Map<String, Value>> {
-    let mut summary: Map<String, Value> = serde_json::from_str(summary)?;
+fn numbers(summary: &str) -> Result<Value> {
+    let mut summary: Value = serde_json::from_str(summary)?;
     for measured in ["tick_latency_us", "full_solve_us"] {
-        summary.remove(measured);
+        summary[measured] = Value::Null;
     }
     Ok(summary)
 }
 
 /// What came of a mission, besides its recording.
 struct Way {
-    summary: Map<String, Value>,
+    summary: Value,
     /// A line for each tick.
-    truth: Vec<String>,
+    truth: String,
 }
 
 impl Way {
-    /// Returns the number of ticks up to the event that decided the mission. What follows depends
-    /// on how soon the supervisor sees it.
-    fn ticks(&self) -> u64 {
-        self.summary.get("ticks").and_then(Value::as_u64).unwrap_or_default()
-    }
-
     /// Returns the first difference from `other`, whose ground truth may go on for longer.
     fn difference(&self, other: &Self) -> Option<String> {
-        let keys = self.summary.keys().chain(other.summary.keys());
-        let values = keys.map(|key| (key, self.summary.get(key), other.summary.get(key)));
-        for (key, one, many) in values {
-            if one != many {
-                let [one, many] = [one, many].map(|it| it.unwrap_or(&Value::Null));
-                return Some(format!("summary, {key}: {one} and {many}"));
-            }
+        let both = [&self.summary, &other.summary];
+        let mut keys = both.into_iter().filter_map(Value::as_object).flat_map(Map::keys);
+        if let Some(key) = keys.find(|key| self.summary[*key] != other.summary[*key]) {
+            let [one, many] = both.map(|summary| &summary[key]);
+            return Some(format!("summary, {key}: {one} and {many}"));
         }
-        let others = other.truth.iter().map(String::as_str).chain(iter::repeat(""));
-        let mut lines = self.truth.iter().zip(others).enumerate();
+        let others = other.truth.lines().chain(iter::repeat(""));
+        let mut lines = self.truth.lines().zip(others).enumerate();
         let (at, (one, many)) = lines.find(|(_, (one, many))| one != many)?;
         Some(format!("ground truth {at}: {one} and {many}"))
     }

@@ -123,15 +123,14 @@ pub fn main(arguments: &Arguments) -> Result {
     let table: Vec<Fault> = crate::rows(include_str!("bring_up/faults.csv").as_bytes())?;
     let all = arguments.faulty + arguments.right;
     let mut right = 0;
-    let one = |number: &u64, _| {
-        one(arguments, &table, *number).unwrap_or_else(|why| (false, format!("failed: {why}")))
-    };
+    let one = |number: &u64, _: usize| one(arguments, &table, *number);
     let jobs = NonZero::new(arguments.jobs.max(1));
-    in_parallel((0..all).collect(), jobs, one, |(is_right, line)| {
-        if !is_right {
-            return print_line(line);
+    in_parallel((0..all).collect(), jobs, one, |_, found| {
+        match found {
+            Ok(None) => right += 1,
+            Ok(Some(wrong)) => print_line(wrong)?,
+            Err(why) => print_line(format!("failed: {why}"))?,
         }
-        right += 1;
         Ok(())
     })?;
     print_line(format!("findings of {right} of {all} robots are right"))?;
@@ -141,7 +140,8 @@ pub fn main(arguments: &Arguments) -> Result {
     Err("the findings missed a fault or named one that does not exist".into())
 }
 
-fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<(bool, String)> {
+/// Brings up a robot. Returns its faults and findings unless these are right.
+fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<Option<String>> {
     let mut random = Random::of_world(arguments.seed, 0, number);
     let robot = &*arguments.robots[number as usize % arguments.robots.len()];
     let body = ROBOTS.iter().find(|it| it.0 == robot).map_or("", |it| it.1);
@@ -164,8 +164,9 @@ fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<(bool, Str
         }
     }
     let keys: Vec<_> = faults.iter().flat_map(|fault| fault.keys(&mut random)).collect();
-    let (turns, of_mission): (Vec<_>, Vec<_>) =
-        keys.iter().cloned().partition(|key| key.starts_with(ODOMETRY_TURNS));
+    let turns = keys.iter().find_map(|key| key.strip_prefix(ODOMETRY_TURNS));
+    let mut of_mission = keys.clone();
+    of_mission.retain(|key| !key.starts_with(ODOMETRY_TURNS));
     let mission = missions::parsed(&text, "bring-up", &of_mission)?;
     let directory = arguments.out.join(number.to_string());
     let mut simulator = robot::simulated(&directory, &mission)?;
@@ -175,8 +176,7 @@ fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<(bool, Str
     let node = if body.contains(ADDRESS) {
         None
     } else {
-        let turns = turns.first().map_or(Ok(1.0), |key| key[ODOMETRY_TURNS.len()..].parse());
-        let turns = turns.or_cannot("read a fault")?;
+        let turns = turns.map_or(Ok(1.0), str::parse).or_cannot("read a fault")?;
         let stated = |keys: &[String]| missions::parsed(&text, "bring-up", keys);
         Some(Ros2Robot::start(simulator.address(), number, turns, stated)?)
     };
@@ -206,8 +206,10 @@ fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<(bool, Str
     let wrong: BTreeSet<&str> = wrong.filter_map(|it| it["part"].as_str()).collect();
     let found = faults.iter().all(|fault| fault.parts().any(|part| wrong.contains(part)));
     let parts: BTreeSet<&str> = faults.iter().flat_map(|fault| fault.parts()).collect();
+    if found && wrong.is_subset(&parts) {
+        return Ok(None);
+    }
     let names: Vec<_> = faults.iter().map(|fault| &*fault.name).collect();
-    let line =
-        format!("robot {number}: {} ({}): found {wrong:?}", names.join(", "), keys.join(" "));
-    Ok((found && wrong.is_subset(&parts), line))
+    let (names, keys) = (names.join(", "), keys.join(" "));
+    Ok(Some(format!("robot {number}: {names} ({keys}): found {wrong:?}")))
 }

@@ -105,20 +105,16 @@ enum Source {
     Pose,
 }
 
-impl Source {
-    /// Returns the residual in words, with its unit.
-    const fn name(self) -> &'static str {
-        match self {
-            Self::Way => "way of the wheels less that of the stated response, m per tick",
-            Self::Turn => "turn of the wheels less that of the stated response, rad per tick",
-            Self::Gyro => "turn of the gyro less that of the wheels, rad per tick",
-            Self::Echo => "echo less the last one and the way between, m",
-            Self::ScanFix => "scan fix less pose, squared over both variances",
-            Self::Interval => "interval of ticks less the nominal one, s",
-            Self::Pose => "pose less ground truth, squared over its variance",
-        }
-    }
-}
+/// Residual of each source in words, with its unit.
+const RESIDUALS: [&str; 7] = [
+    "way of the wheels less that of the stated response, m per tick",
+    "turn of the wheels less that of the stated response, rad per tick",
+    "turn of the gyro less that of the wheels, rad per tick",
+    "echo less the last one and the way between, m",
+    "scan fix less pose, squared over both variances",
+    "interval of ticks less the nominal one, s",
+    "pose less ground truth, squared over its variance",
+];
 
 struct Residual {
     source: Source,
@@ -137,32 +133,27 @@ pub fn main(arguments: &Arguments) -> Result {
         return print_line(format!("{robot}, {}; see {}", scenario.mission.name, file.display()));
     }
     let mut all: BTreeMap<(&str, Source), Vec<f64>> = BTreeMap::new();
-    let mut doubts = Doubts::default();
-    let drive =
-        |&number: &u64, _: usize| (number, drive(seed, number).map_err(|error| error.to_string()));
-    let mut failed = 0;
-    in_parallel((0..count).collect(), arguments.jobs, drive, |(number, driven)| {
+    let mut done = Vec::new();
+    let drive = |&number: &u64, _: usize| drive(seed, number);
+    in_parallel((0..count).collect(), arguments.jobs, drive, |number, driven| {
         match driven {
-            Ok((robot, healthy)) => {
+            Ok((robot, mut healthy)) => {
                 for (cause, doubt) in &healthy.causes {
                     say(format_args!("mission {number}, {robot}: {} ({doubt})", cause.name()));
                 }
-                doubts.add(&healthy);
-                for Residual { source, value, .. } in healthy.residuals {
+                for Residual { source, value, .. } in std::mem::take(&mut healthy.residuals) {
                     all.entry((robot, source)).or_default().push(value);
                 }
+                done.push(healthy);
             }
-            Err(error) => {
-                say(format_args!("mission {number}: {error}"));
-                failed += 1;
-            }
+            Err(error) => say(format_args!("mission {number}: {error}")),
         }
         Ok(())
     })?;
     summarize(all, &directory.join("corpus.csv"))?;
-    doubts.write(&directory.join("doubts.csv"))?;
+    write_doubts(&done, &directory.join("doubts.csv"))?;
     print_line(format!("{count} missions from seed {seed}; see {}", directory.display()))?;
-    match failed {
+    match count - done.len() as u64 {
         0 => Ok(()),
         broken => Err(format!("{broken} missions failed and are not in the tables").into()),
     }
@@ -180,7 +171,7 @@ fn summarize(all: BTreeMap<(&str, Source), Vec<f64>>, file: &Path) -> Result {
         let at = |share: f64| sizes[((sizes.len() - 1) as f64 * share) as usize];
         let figures = [mean, at(0.5), at(0.99), at(0.999), at(1.0)];
         let figures = figures.map(|figure| format!("{figure:.4}"));
-        summary.serialize(("corpus", source.name(), robot, values.len(), figures))?;
+        summary.serialize(("corpus", RESIDUALS[source as usize], robot, values.len(), figures))?;
     }
     Ok(summary.flush()?)
 }
@@ -189,68 +180,51 @@ fn summarize(all: BTreeMap<(&str, Source), Vec<f64>>, file: &Path) -> Result {
 const TAIL: f64 = 0.05;
 const PER_HOURS: f64 = 100.0;
 
-/// Evidence against healthy robots.
-#[derive(Default)]
-struct Doubts {
-    missions: usize,
-    hours: f64,
-    /// Greatest evidence of each mission that had some, by doubt.
-    greatest: BTreeMap<&'static str, Vec<f64>>,
-    causes: BTreeMap<&'static str, u32>,
-}
-
-impl Doubts {
-    fn add(&mut self, mission: &Healthy) {
-        self.missions += usize::from(mission.hours > 0.0);
-        self.hours += mission.hours;
-        for (doubt, evidence) in &mission.greatest {
-            self.greatest.entry(doubt).or_default().push(*evidence);
-        }
-        for (cause, _) in &mission.causes {
-            *self.causes.entry(cause.name()).or_default() += 1;
-        }
+/// Extrapolates how often each doubt reaches 1, at which the robot stands.
+///
+/// The excess over a high threshold is distributed exponentially (J. Pickands, "Statistical
+/// inference using extreme order statistics", Annals of Statistics 3, 1975; shape 0).
+fn write_doubts(missions: &[Healthy], file: &Path) -> Result {
+    let untouched = missions.iter().filter(|it| it.hours > 0.0).count();
+    let hours = missions.iter().map(|it| it.hours).sum::<f64>();
+    let per_hours = |count: f64| format!("{:.2}", count / hours * PER_HOURS);
+    let mut greatest: BTreeMap<_, Vec<f64>> = BTreeMap::new();
+    for (doubt, evidence) in missions.iter().flat_map(|it| &it.greatest) {
+        greatest.entry(*doubt).or_default().push(*evidence);
     }
-
-    /// Extrapolates how often each doubt reaches 1, at which the robot stands.
-    ///
-    /// The excess over a high threshold is distributed exponentially (J. Pickands, "Statistical
-    /// inference using extreme order statistics", Annals of Statistics 3, 1975; shape 0).
-    fn write(self, file: &Path) -> Result {
-        let per_hours = |count: f64| format!("{:.2}", count / self.hours * PER_HOURS);
-        let mut rows = csv::Writer::from_path(file)?;
-        rows.write_record(["section", "doubt", "hours", "95 %", "largest", "found", "expected"])?;
-        let hours = format!("{:.1}", self.hours);
-        for (doubt, mut all) in self.greatest {
-            all.resize(self.missions, 0.0);
-            all.sort_by(f64::total_cmp);
-            let (below, tail) = all.split_at(((1.0 - TAIL) * all.len() as f64) as usize);
-            let least = below.last().copied().unwrap_or_default();
-            let mean = tail.iter().map(|it| it - least).sum::<f64>() / tail.len() as f64;
-            let expected = if mean > 0.0 { (-(1.0 - least) / mean).exp().min(1.0) } else { 0.0 };
-            let found = tail.iter().filter(|it| **it >= 1.0).count();
-            let largest = tail.last().copied().unwrap_or_default();
-            let figures = [least, largest].map(|figure| format!("{figure:.2}"));
-            let rates = [found as f64, expected * tail.len() as f64].map(per_hours);
-            rows.serialize(("doubts", doubt, &hours, figures, rates))?;
-        }
-        for (cause, count) in self.causes {
-            rows.serialize((
-                "doubts",
-                cause,
-                &hours,
-                ["", ""],
-                [per_hours(count.into()), String::new()],
-            ))?;
-        }
-        Ok(rows.flush()?)
+    let mut causes: BTreeMap<_, u32> = BTreeMap::new();
+    for (cause, _) in missions.iter().flat_map(|it| &it.causes) {
+        *causes.entry(cause.name()).or_default() += 1;
     }
+    let mut rows = csv::Writer::from_path(file)?;
+    rows.write_record(["section", "doubt", "hours", "95 %", "largest", "found", "expected"])?;
+    let in_all = format!("{hours:.1}");
+    for (doubt, mut all) in greatest {
+        all.resize(untouched, 0.0);
+        all.sort_by(f64::total_cmp);
+        let (below, tail) = all.split_at(((1.0 - TAIL) * all.len() as f64) as usize);
+        let least = below.last().copied().unwrap_or_default();
+        let mean = tail.iter().map(|it| it - least).sum::<f64>() / tail.len() as f64;
+        let expected = if mean > 0.0 { (-(1.0 - least) / mean).exp().min(1.0) } else { 0.0 };
+        let found = tail.iter().filter(|it| **it >= 1.0).count();
+        let largest = tail.last().copied().unwrap_or_default();
+        let figures = [least, largest].map(|figure| format!("{figure:.2}"));
+        let rates = [found as f64, expected * tail.len() as f64].map(per_hours);
+        rows.serialize(("doubts", doubt, &in_all, figures, rates))?;
+    }
+    for (cause, count) in causes {
+        rows.serialize(("doubts", cause, &in_all, ["", ""], per_hours(count.into()), ""))?;
+    }
+    Ok(rows.flush()?)
 }
 
 /// What a healthy mission shows.
 #[derive(Default)]
 struct Healthy {
     residuals: Vec<Residual>,
+    /// 0 for a robot that was touched.
     hours: f64,
+    /// Greatest evidence of each doubt.
     greatest: BTreeMap<&'static str, f64>,
     /// Causes that say that the robot is faulty, and its greatest doubt.
     causes: Vec<(Cause, &'static str)>,
@@ -289,7 +263,7 @@ fn healthy(scenario: &Scenario) -> Result<Healthy> {
     }
     let mut watch = watch.ok_or("the simulation still watches a run that has ended")?;
     watch.judge_poses(&ran.truth);
-    watch.failed.or_cannot("read the bus of a simulation")?;
+    watch.readers.or_cannot("read the bus of a simulation")?;
     let hours = ran.simulated.as_secs_f64() / 3600.0;
     // A robot that was touched may rightly be doubted.
     Ok(match ran.truth.last() {
@@ -300,12 +274,14 @@ fn healthy(scenario: &Scenario) -> Result<Healthy> {
 
 impl Observer for Watch {
     fn on_bus(&mut self, bus: &Bus) {
-        self.failed = Inputs::open_readers(bus).map(|readers| self.readers = Some(readers));
+        self.readers = Inputs::open_readers(bus).map(Some);
     }
 
     fn observe(&mut self) {
-        if let Some(mut readers) = self.readers.take() {
-            self.failed = self.take(&mut readers).map(|()| self.readers = Some(readers));
+        if let Ok(readers) = &mut self.readers
+            && let Some(mut readers) = readers.take()
+        {
+            self.readers = self.take(&mut readers).map(|()| Some(readers));
         }
     }
 }
@@ -326,8 +302,7 @@ readers! {
 
 /// Watch of a run, which ends with the first error.
 struct Watch {
-    readers: Option<Inputs>,
-    failed: Result<(), BusError>,
+    readers: Result<Option<Inputs>, BusError>,
     shown: Healthy,
     cause: Cause,
     /// Greatest doubt now.
@@ -350,8 +325,7 @@ impl Watch {
         let response = body.response;
         let axis = |most| ModelledSpeed::new(response.dead_time_s(), most);
         Self {
-            readers: None,
-            failed: Ok(()),
+            readers: Ok(None),
             shown: Healthy::default(),
             cause: Cause::None,
             doubt: "",
@@ -386,8 +360,8 @@ impl Watch {
             self.gyro.insert(turn.capture_ns, turn.turn_rad);
         }
         while let Some(fix) = readers.fix.next_sample()? {
-            let mut poses = self.poses.iter().rev();
-            if let Some(pose) = poses.find(|pose| pose.stamp.stamp_ns == fix.capture_ns) {
+            let its = |pose: &&PoseSample| pose.stamp.stamp_ns == fix.capture_ns;
+            if let Some(pose) = self.poses.iter().rfind(its) {
                 let off = DVec2::new(fix.x_m - pose.x_m, fix.y_m - pose.y_m);
                 let variance = of_place(&fix.covariance) + of_place(&pose.covariance);
                 self.find(Source::ScanFix, fix.stamp.tick, squared_over(off, variance));
@@ -442,19 +416,21 @@ impl Watch {
 
     /// Compares an echo with the last one of its sensor.
     fn on_echo(&mut self, tick: u64, reading: &RangeReading) {
-        let Some(sensor) = self.sensors.get(usize::from(reading.sensor)) else { return };
-        let is_echo = sensor.kind == SensorKind::Cone && reading.status() == RangeStatus::Measured;
-        let pose = self.poses.last().filter(|_| is_echo);
-        let Some(now) = pose.map(PoseSample::pose) else { return };
-        let axis = sensor.mount.looks_rad();
-        let last = self.echoes.insert(reading.sensor, (now, reading.range_m));
-        let Some((before, range_m)) = last else { return };
-        let moved = now.position - before.position;
-        let nearer_m = moved.dot(DVec2::from_angle(now.heading + axis));
-        let off_m = reading.range_m - (range_m - nearer_m);
-        let turned_rad = (now.heading - before.heading).abs();
-        if turned_rad < SAME_SURFACE_RAD && off_m.abs() < SAME_SURFACE_M {
-            self.find(Source::Echo, tick, off_m);
+        if let Some(sensor) = self.sensors.get(usize::from(reading.sensor))
+            && sensor.kind == SensorKind::Cone
+            && reading.status() == RangeStatus::Measured
+            && let Some(now) = self.poses.last().map(PoseSample::pose)
+            && let Some((before, range_m)) =
+                self.echoes.insert(reading.sensor, (now, reading.range_m))
+        {
+            let moved = now.position - before.position;
+            let axis = now.heading + sensor.mount.looks_rad();
+            let nearer_m = moved.dot(DVec2::from_angle(axis));
+            let off_m = reading.range_m - (range_m - nearer_m);
+            let turned_rad = (now.heading - before.heading).abs();
+            if turned_rad < SAME_SURFACE_RAD && off_m.abs() < SAME_SURFACE_M {
+                self.find(Source::Echo, tick, off_m);
+            }
         }
     }
 
@@ -469,7 +445,7 @@ impl Watch {
                 self.shown.residuals.retain(|residual| residual.tick < pose.stamp.tick);
                 break;
             }
-            let off = DVec2::new(pose.x_m - rest[0].x, pose.y_m - rest[0].y);
+            let off = pose.pose().position - rest[0].pose().position;
             let error = squared_over(off, of_place(&pose.covariance));
             self.find(Source::Pose, pose.stamp.tick, error);
         }

@@ -110,7 +110,7 @@ pub fn run(plan: &Plan, results: &mut Results, title: &str) -> Result {
                 let is_done = |(noise, robot): (u64, &Trial)| {
                     done.contains(&(robot.mission.name.clone(), noise, setting.name.clone()))
                 };
-                if !noises(seed).zip(trial.robots()).all(is_done) {
+                if !(seed..).zip(trial.robots()).all(is_done) {
                     left.push(Job { plan, trial, setting, seed, directory: &directory });
                 }
             }
@@ -119,15 +119,11 @@ pub fn run(plan: &Plan, results: &mut Results, title: &str) -> Result {
     let first = all - left.len();
     let (began, mut ended, mut line) = (Instant::now(), 0, ProgressLine::new(LINE_EVERY));
     let run = |job: &Job<'_>, thread| {
-        let ended = match job.run(thread) {
-            Ok(rows) if rows.iter().any(|(row, _)| row.outcome == Outcome::Aborted) => {
-                job.run(thread)
-            }
-            ended => ended,
-        };
-        ended.map_err(|error| error.to_string())
+        let rows = job.run(thread)?;
+        let is_aborted = rows.iter().any(|(row, _)| row.outcome == Outcome::Aborted);
+        if is_aborted { job.run(thread) } else { Ok(rows) }
     };
-    let kept = in_parallel(left, plan.jobs, run, |given| {
+    let kept = in_parallel(left, plan.jobs, run, |_, given| {
         for (row, latency) in given? {
             // Latencies come first, so that a mission with a row has both.
             if let Some(latency) = latency {
@@ -148,24 +144,20 @@ pub fn run(plan: &Plan, results: &mut Results, title: &str) -> Result {
     kept
 }
 
-fn noises(seed: u64) -> impl Iterator<Item = u64> {
-    (0..).map(move |robot| seed.wrapping_add(robot))
-}
-
 fn world_file(directory: &Path, world: &str) -> PathBuf {
     directory.join("worlds").join(format!("{world}.toml"))
 }
 
-/// Runs `jobs` on numbered threads, by default one per processor, and takes results in order of
-/// completion.
+/// Runs `jobs` on numbered threads, by default one per processor, and takes each with its result in
+/// order of completion.
 ///
 /// # Errors
 /// Returns the first error of `take`; no further job begins.
 pub fn in_parallel<Job: Send, Done: Send>(
     jobs: Vec<Job>,
     threads: Option<NonZero<usize>>,
-    work: impl Fn(&Job, usize) -> Done + Sync,
-    take: impl FnMut(Done) -> Result,
+    work: impl Fn(&Job, usize) -> Result<Done> + Sync,
+    mut take: impl FnMut(Job, Result<Done, String>) -> Result,
 ) -> Result {
     let threads = threads.or(thread::available_parallelism().ok()).map_or(1, NonZero::get);
     let (queue, (give, results)) = (Mutex::new(jobs.into_iter()), channel());
@@ -173,13 +165,16 @@ pub fn in_parallel<Job: Send, Done: Send>(
         for number in 0..threads {
             let (give, queue, work) = (give.clone(), &queue, &work);
             scope.spawn(move || {
-                while let Some(job) = queue.lock().ok().and_then(|mut queue| queue.next())
-                    && give.send(work(&job, number)).is_ok()
-                {}
+                while let Some(job) = queue.lock().ok().and_then(|mut queue| queue.next()) {
+                    let done = work(&job, number).map_err(|error| error.to_string());
+                    if give.send((job, done)).is_err() {
+                        break;
+                    }
+                }
             });
         }
         drop(give);
-        results.into_iter().try_for_each(take)
+        results.into_iter().try_for_each(|(job, done)| take(job, done))
     })
 }
 
@@ -209,8 +204,8 @@ impl Robot<'_> {
     }
 
     fn calibrate(&mut self) -> Result {
-        let beside = |extension| self.directory.with_extension(extension);
-        let (runs, file) = (beside("calibration"), beside("calibration.toml"));
+        let runs = self.directory.with_extension("calibration");
+        let file = self.directory.with_extension("calibration.toml");
         let mut calibrate = self.firsthand("calibrate");
         calibrate.args(["--set", "simulation.other='none'"]);
         calibrate.arg("--runs").arg(runs).arg("--out").arg(&file);
@@ -260,9 +255,7 @@ impl Job<'_> {
             ["evaluate", "oncoming"].map(|robot| format!("{robot}{}-{worker}", std::process::id()));
         let mut robots: Vec<Robot<'_>> = Vec::new();
         let others = names.iter().rev();
-        for (((trial, seed), name), other) in
-            trial.robots().zip(noises(seed)).zip(&names).zip(others)
-        {
+        for (((trial, seed), name), other) in trial.robots().zip(seed..).zip(&names).zip(others) {
             let mut set = setting.set.clone();
             if self.trial.oncoming.is_some() {
                 set.push(format!("simulation.other='{other}'"));
