@@ -43,9 +43,10 @@ fn totals(setting: &str, rows: &[Row]) -> Value {
     let rows: Vec<&Row> = rows.iter().filter(|row| row.setting == setting).collect();
     let mut totals = json!({ "setting": setting, "count": rows.len() });
     let mut add = |name: &str, counts: &dyn Fn(&Row) -> bool| {
-        let share = share(rows.iter().filter(|row| counts(row)).count(), rows.len());
-        totals[name] = share.value.into();
-        totals["intervals"][name] = [share.low, share.high].map(rounded).into();
+        let hits = rows.iter().filter(|row| counts(row)).count();
+        let [share, low, high] = share(hits, rows.len());
+        totals[name] = share.into();
+        totals["intervals"][name] = [low, high].map(rounded).into();
     };
     OUTCOMES.into_iter().for_each(|name| add(name, &|row| row.outcome_name() == name));
     // Collisions in motion; in the others the robot was run into at rest.
@@ -76,8 +77,7 @@ fn versus(from: &str, to: &str, rows: &[Row]) -> Value {
     let change = |has: &dyn Fn(&Row) -> bool| {
         let gained = pairs.iter().filter(|(a, b)| has(b) && !has(a)).count();
         let lost = pairs.iter().filter(|(a, b)| has(a) && !has(b)).count();
-        let change = paired_difference(gained, lost, pairs.len());
-        [change.value, change.low, change.high].map(rounded)
+        paired_difference(gained, lost, pairs.len()).map(rounded)
     };
     let both = pairs.iter().filter(|(a, b)| a.is_success() && b.is_success());
     let mut versus = json!({

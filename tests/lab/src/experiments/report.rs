@@ -13,7 +13,7 @@ use crate::{
         results::Results,
         row::{Outcome, Row, spread},
         runner::picture,
-        statistics::{Estimate, share},
+        statistics::share,
     },
 };
 
@@ -63,7 +63,7 @@ pub fn report(experiments: &[Experiment], rows: &[Row]) -> Result<Vec<Value>> {
 fn findings(rows: &[&Row]) -> Value {
     let [arrived, touched, wrong_place] =
         [Outcome::Success, Outcome::Collision, Outcome::WrongPlace].map(|it| count(rows, it));
-    let Estimate { low, high, .. } = share(arrived, rows.len());
+    let [_, low, high] = share(arrived, rows.len());
     let mut object = json!({
         "count": rows.len(),
         "arrived": arrived,

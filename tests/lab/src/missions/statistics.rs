@@ -5,36 +5,29 @@ use serde::Serialize;
 /// Quantile of the normal distribution for 95 %.
 const Z: f64 = 1.959_963_984_540_054;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
-    pub value: f64,
-    pub low: f64,
-    pub high: f64,
-}
-
-/// Returns the share with Wilson's interval (Wilson 1927).
-pub fn share(hits: usize, n: usize) -> Estimate {
+/// Returns the share, and the ends of Wilson's interval (Wilson 1927).
+pub fn share(hits: usize, n: usize) -> [f64; 3] {
     if n == 0 {
-        return Estimate { value: f64::NAN, low: 0.0, high: 1.0 };
+        return [f64::NAN, 0.0, 1.0];
     }
     let (hits, n) = (hits as f64, n as f64);
     let value = hits / n;
     let z2 = Z * Z;
     let middle = (value + z2 / (2.0 * n)) / (1.0 + z2 / n);
     let half = Z / (1.0 + z2 / n) * (value * (1.0 - value) / n + z2 / (4.0 * n * n)).sqrt();
-    Estimate { value, low: (middle - half).max(0.0), high: (middle + half).min(1.0) }
+    [value, (middle - half).max(0.0), (middle + half).min(1.0)]
 }
 
-/// Returns the difference of two shares on the same `n` worlds. `gained` worlds count only in the
-/// second setting, `lost` only in the first. Uses Wald's interval with half a pair added to each
-/// cell (Agresti and Min 2005).
-pub fn paired_difference(gained: usize, lost: usize, n: usize) -> Estimate {
+/// Returns the difference of two shares on the same `n` worlds, and the ends of its interval.
+/// `gained` worlds count only in the second setting, `lost` only in the first. Uses Wald's interval
+/// with half a pair added to each cell (Agresti and Min 2005).
+pub fn paired_difference(gained: usize, lost: usize, n: usize) -> [f64; 3] {
     let (gained, lost, n) = (gained as f64, lost as f64, n as f64);
     let value = if n > 0.0 { (gained - lost) / n } else { f64::NAN };
     let (gained, lost, n) = (gained + 0.5, lost + 0.5, n + 2.0);
     let middle = (gained - lost) / n;
     let half = Z * (gained + lost - (gained - lost).powi(2) / n).sqrt() / n;
-    Estimate { value, low: (middle - half).max(-1.0), high: (middle + half).min(1.0) }
+    [value, (middle - half).max(-1.0), (middle + half).min(1.0)]
 }
 
 pub fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
@@ -75,9 +68,9 @@ pub fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 mod tests {
     use super::*;
 
-    fn close(found: Estimate, low: f64, high: f64) {
-        assert!((found.low - low).abs() < 5e-4, "{found:?}");
-        assert!((found.high - high).abs() < 5e-4, "{found:?}");
+    fn close(found: [f64; 3], low: f64, high: f64) {
+        assert!((found[1] - low).abs() < 5e-4, "{found:?}");
+        assert!((found[2] - high).abs() < 5e-4, "{found:?}");
     }
 
     #[test]
@@ -88,11 +81,11 @@ mod tests {
 
     #[test]
     fn a_paired_difference_depends_on_the_worlds_that_differ_alone() {
-        let found = paired_difference(12, 4, 100);
-        assert_eq!(found.value, 0.08);
-        assert!(found.low > 0.0 && found.high < 0.17, "{found:?}");
-        let none = paired_difference(0, 0, 100);
-        assert!(none.low < 0.0 && none.high > 0.0, "{none:?}");
+        let [value, low, high] = paired_difference(12, 4, 100);
+        assert_eq!(value, 0.08);
+        assert!(low > 0.0 && high < 0.17, "{low} to {high}");
+        let [_, low, high] = paired_difference(0, 0, 100);
+        assert!(low < 0.0 && high > 0.0, "{low} to {high}");
     }
 
     #[test]
