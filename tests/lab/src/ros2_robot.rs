@@ -19,7 +19,7 @@ use common::{
     clock::monotonic_ns,
     json_wire::{Lines, Order, Report, Scan, line, parse},
     kinematics::{DifferentialDrive, Pose2, Twist},
-    mission::{Mission, Protocol, RobotConfig, Ros2Topics},
+    mission::{Mission, Protocol, Ros2Topics},
     poll,
 };
 use console::{
@@ -66,9 +66,10 @@ pub struct Arguments {
 pub fn main(arguments: &Arguments) -> Result {
     let Arguments { mission, set, out } = arguments;
     let mut own = missions::load(mission, set)?;
-    let RobotConfig { protocol, address, ros2, .. } = &mut own.robot;
     // The mission may already describe the robot that this one is presented as.
-    (*protocol, *address, *ros2) = (Some(Protocol::Json), None, Ros2Topics::default());
+    own.robot.protocol = Some(Protocol::Json);
+    own.robot.address = None;
+    own.robot.ros2 = Ros2Topics::default();
     let mut simulator = simulated(out, &own)?;
     let stated = |keys: &[String]| missions::load(mission, keys);
     let robot = Ros2Robot::start(simulator.address(), 0, 1.0, stated)?;
@@ -245,23 +246,19 @@ impl Program {
             Content::Battery => {
                 report.battery_v.map(|volts| battery(Header::at(now_ns, ""), volts))
             }
-            Content::Hazards => {
-                (!report.touched.is_empty()).then(|| hazards(&report.touched, now_ns))
-            }
+            Content::Hazards if report.touched.is_empty() => None,
+            Content::Hazards => Some(hazards(&report.touched, now_ns)),
             _ => None,
         }
     }
 
     fn scan(&self, row: usize, report: &Report, now_ns: u64) -> Option<Vec<u8>> {
         let sensor = self.stated.sensor_table().into_iter().nth(row)?;
-        let only = report.scan.clone().map(|ranges| Scan {
-            ranges,
-            age_s: report.scan_age_s,
-            time_s: report.scan_time_s,
-        });
-        let Scan { ranges, age_s, time_s } =
-            only.or_else(|| report.scans.get(&sensor.name).cloned())?;
-        let range = |range: &Option<f32>| match *range {
+        let Scan { ranges, age_s, time_s } = match report.scan.clone() {
+            Some(ranges) => Scan { ranges, age_s: report.scan_age_s, time_s: report.scan_time_s },
+            None => report.scans.get(&sensor.name)?.clone(),
+        };
+        let range = |range: Option<f32>| match range {
             None => f32::INFINITY,
             Some(range) if range < 0.0 => f32::NAN,
             Some(range) => range,
@@ -270,7 +267,7 @@ impl Program {
         let beam_s = time_s.unwrap_or_default() / ranges.len() as f64;
         let period_s = sensor.every_ticks as f64 / self.stated.robot.rate_hz;
         let limits = [sensor.model.product().least_m, sensor.reach_m];
-        let ranges = ranges.iter().map(range).collect();
+        let ranges = ranges.into_iter().map(range).collect();
         let header = Header::at(taken_ns, &sensor.name);
         Some(scan(header, sensor.fan().into(), limits, [beam_s, period_s], ranges))
     }
