@@ -196,8 +196,9 @@ impl Attack {
         // frozen alone stays frozen.
         let thaws = |it: &&RosterEntry| !self.was_frozen(name_str(&it.stage), it.generation);
         let stages = self.entries.iter().filter(thaws).map(|entry| entry.pid);
-        let all = [self.supervisor].into_iter().chain(stages);
-        let all: Vec<_> = all.filter(|&process| send(process, Signal::STOP)).collect();
+        let mut all = vec![self.supervisor];
+        all.extend(stages);
+        all.retain(|&process| send(process, Signal::STOP));
         let began = Instant::now();
         std::thread::sleep(pause);
         for process in all.into_iter().rev() {

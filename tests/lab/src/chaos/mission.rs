@@ -41,8 +41,8 @@ pub fn attack(series: &mut Series) -> Result {
     let directory = files.join("run");
     let simulated = || robot::simulated(&files.join("robot"), &mission);
     let Arguments { mission: name, robot: robot_name, set, .. } = &series.asked;
-    let (replays, hits_recorders) = (series.asked.replay, series.asked.include_consumers);
-    let mut robot = series.asked.include_supervisor.then(simulated).transpose()?;
+    let Arguments { replay, include_consumers, include_supervisor, .. } = series.asked;
+    let mut robot = include_supervisor.then(simulated).transpose()?;
     // A robot in its own process needs real time.
     let pace = if robot.is_some() { "1" } else { "4" };
     let mut start = robot::mission("run", name, robot_name, set);
@@ -56,7 +56,7 @@ pub fn attack(series: &mut Series) -> Result {
     let mut attack = Attack::new(seed, consumers);
     let began = Instant::now();
     let summary = loop {
-        let mut run = Run::start(start, &directory, replays || hits_recorders)?;
+        let mut run = Run::start(start, &directory, replay || include_consumers)?;
         let attacked = attack.run(series, &mut run.process, robot.as_mut(), PATIENCE);
         run.process.end(Duration::from_secs(2));
         attacked?;
@@ -105,9 +105,9 @@ pub fn attack(series: &mut Series) -> Result {
             "pose error {excess_m:.4} m above the undisturbed run; the allowance is {allowance_m:.4} m"
         ));
     }
-    if replays {
+    if replay {
         let replays = report.replays.get_or_insert_default();
-        replays.add(&directory, hits_recorders, &others, &mut wrong);
+        replays.add(&directory, include_consumers, &others, &mut wrong);
     }
     if wrong.is_empty() {
         fs::remove_dir_all(&files).or_cannot("remove its directory")?;

@@ -53,8 +53,8 @@ pub struct Report {
     pub replays: Option<Replays>,
 }
 
-#[derive(Default, Serialize)]
-struct Delays(#[serde(serialize_with = "quantiles")] Histogram);
+#[derive(Default)]
+struct Delays(Histogram);
 
 pub struct Series {
     pub asked: Arguments,
@@ -134,10 +134,12 @@ impl Report {
     }
 }
 
-/// Serializes median, 99 % quantile and maximum in milliseconds.
-fn quantiles<S: Serializer>(histogram: &Histogram, to: S) -> Result<S::Ok, S::Error> {
-    let us = [0.5, 0.99, 1.0].into_iter().filter_map(|share| histogram.quantile_us(share));
-    to.collect_seq(us.map(|us| rounded(us / 1e3)))
+/// Median, 99 % quantile and maximum in milliseconds.
+impl Serialize for Delays {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        let us = [0.5, 0.99, 1.0].into_iter().filter_map(|share| self.0.quantile_us(share));
+        to.collect_seq(us.map(|us| rounded(us / 1e3)))
+    }
 }
 
 /// Signal; unmeasured values are empty cells. Delays count from the signal.

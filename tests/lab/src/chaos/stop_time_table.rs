@@ -74,11 +74,10 @@ impl StopTimeTable {
     /// Writes the table to `file`, with `section` in the first column.
     pub fn write(&self, section: &str, file: &Path) -> Result {
         let mut writer = csv::Writer::from_path(file)?;
-        writer.write_field("section")?;
-        writer.write_record(HEADINGS.map(|heading| heading.trim_start_matches('>')))?;
+        let headings = HEADINGS.map(|heading| heading.trim_start_matches('>'));
+        writer.serialize(("section", headings))?;
         for row in self.rows() {
-            writer.write_field(section)?;
-            writer.write_record(row)?;
+            writer.serialize((section, row))?;
         }
         Ok(writer.flush()?)
     }
