@@ -63,10 +63,6 @@ struct Fault {
 }
 
 impl Fault {
-    fn parts(&self) -> impl Iterator<Item = &str> {
-        self.parts.split(';')
-    }
-
     fn keys(&self, random: &mut Random) -> Vec<String> {
         let ranges = [self.from.zip(self.to), self.or_from.zip(self.or_to)];
         let keys = ranges[random.below(2)].map_or(self.keys.clone(), |(from, to)| {
@@ -146,20 +142,20 @@ fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<Option<Str
     let robot = &*arguments.robots[number as usize % arguments.robots.len()];
     let body = ROBOTS.iter().find(|it| it.0 == robot).map_or("", |it| it.1);
     let text = format!("seed = {}\n{ROOM}{body}{}", number + 1, walls(&mut random));
-    let most = match (number < arguments.faulty, robot) {
-        (false, _) => 0,
+    let most = match robot {
+        _ if number >= arguments.faulty => 0,
         // Sonars alone cannot distinguish two wheel faults.
-        (true, "x80" | "sonars") => 1,
-        (true, _) => 1 + random.below(2),
+        "x80" | "sonars" => 1,
+        _ => 1 + random.below(2),
     };
     let table: Vec<&Fault> = table.iter().filter(|fault| fault.robot == robot).collect();
     let mut faults: Vec<&Fault> = Vec::new();
+    // A motor that turns backwards hides other faults.
+    let hides = |fault: &Fault| fault.parts.contains("motors");
     for _ in 0..DRAWS {
         let fault = table[random.below(table.len())];
-        // A motor that turns backwards hides other faults.
-        let hides = |it: &&Fault| [&it.parts, &fault.parts].iter().any(|it| it.contains("motors"));
-        let is_other = !faults.iter().any(|it| it.parts == fault.parts || hides(it));
-        if faults.len() < most && is_other {
+        let shows = |it: &&Fault| it.parts != fault.parts && !hides(it) && !hides(fault);
+        if faults.len() < most && faults.iter().all(shows) {
             faults.push(fault);
         }
     }
@@ -204,8 +200,8 @@ fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<Option<Str
     let findings = said["findings"].as_array().into_iter().flatten();
     let wrong = findings.filter(|it| it["verdict"] == "WRONG");
     let wrong: BTreeSet<&str> = wrong.filter_map(|it| it["part"].as_str()).collect();
-    let found = faults.iter().all(|fault| fault.parts().any(|part| wrong.contains(part)));
-    let parts: BTreeSet<&str> = faults.iter().flat_map(|fault| fault.parts()).collect();
+    let found = faults.iter().all(|fault| fault.parts.split(';').any(|part| wrong.contains(part)));
+    let parts: BTreeSet<&str> = faults.iter().flat_map(|fault| fault.parts.split(';')).collect();
     if found && wrong.is_subset(&parts) {
         return Ok(None);
     }
