@@ -51,18 +51,12 @@ pub struct Row {
     pub f_vs_m_s2: Option<f64>,
     /// Final distance from the estimated to the true position.
     pub pose_error_m: Option<f64>,
-    /// Expected RMS, by the covariance of the last pose.
-    pub pose_error_expected_m: Option<f64>,
     pub true_distance_m: Option<f64>,
     pub safety_events: u64,
     pub sonar_unavailable_share: Option<f64>,
     /// Maximum minus minimum commanded speed of either wheel.
     pub wheel_range_rad_s: Option<f64>,
-    pub looks: u64,
     pub look_s: f64,
-    pub replans: u64,
-    pub resets: u64,
-    pub full_solves: u64,
     /// Speed of the faster wheel in the tick before the contact.
     pub contact_speed_m_s: Option<f64>,
     /// Causes and counts by which the failsafe stopped a departed robot, or slowed it to half
@@ -121,16 +115,11 @@ impl Row {
             f_ps_m2: summary.f_ps_m2,
             f_vs_m_s2: summary.f_vs_m_s2,
             pose_error_m: summary.pose_error_m,
-            pose_error_expected_m: summary.pose_error_expected_m,
             true_distance_m: summary.true_distance_m,
             safety_events: summary.safety_events,
             sonar_unavailable_share: summary.sonar_unavailable_share,
             wheel_range_rad_s: summary.wheel_range_rad_s,
-            looks: summary.looks,
             look_s: summary.look_s,
-            replans: summary.replans.into(),
-            resets: summary.resets,
-            full_solves: summary.full_solves,
             contact_speed_m_s: summary.contact_speed_m_s,
             stops: causes(&summary.stops),
             slowed: causes(&summary.slowed),
