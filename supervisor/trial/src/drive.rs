@@ -2,7 +2,6 @@
 
 use common::{
     clock::{MissionTime, Pace},
-    grid::GridFrame,
     json_wire::{Report, line},
     kinematics::Pose2,
     mission::{Mission, MissionError, Sensor},
@@ -23,23 +22,14 @@ const BEGINS_NS: u64 = 1_000_000_000;
 const LOOKS_NS: u64 = 20_000_000;
 /// Longest pause of a log in which the link takes its turns.
 const MOST_LOOKS: u64 = 500;
-/// Fastest rate of a robot's reports.
+/// Least and fastest rate of a robot's reports.
 const RATES_HZ: [f64; 2] = [1.0, 10.0];
-/// Longest pause of a log that is no silence of its robot, seconds.
-const LONGEST_PAUSE_S: f64 = 5.0;
 /// Space around the odometry, metres.
 const AROUND_M: f64 = 15.0;
 
 /// What a log's pause looks like: no fault of the robot.
-const PAUSES: [Cause; 3] = [Cause::CommandStale, Cause::FramesSilent, Cause::RangeSilent];
-
-/// Stand of the link's failsafe, except during a log's pause.
-#[derive(Debug)]
-pub struct Stand {
-    /// Since the start of the log.
-    pub time_s: f64,
-    pub why: String,
-}
+const PAUSES: [Cause; 4] =
+    [Cause::RobotLost, Cause::CommandStale, Cause::FramesSilent, Cause::RangeSilent];
 
 /// What came of a log.
 #[derive(Debug)]
@@ -49,11 +39,11 @@ pub struct Drive {
     /// True poses of the same times; none without corrected poses.
     pub references: Option<Vec<Pose2>>,
     pub fixes: usize,
-    pub stands: Vec<Stand>,
+    /// Stands of the link's failsafe, except in pauses of the log: seconds since its start, and why.
+    pub stands: Vec<(f64, String)>,
     pub laser: Sensor,
-    pub frame: GridFrame,
-    /// Map, one byte a cell.
-    pub cells: Vec<u8>,
+    /// Map at the end.
+    pub mapper: Mapper,
 }
 
 /// Returns the mission of a robot that gives such a log, around the places of its odometry.
@@ -67,30 +57,21 @@ pub fn mission(log: &Log, robot: Option<&str>) -> Result<Mission, MissionError> 
     let [least, most] = [DVec2::min, DVec2::max].map(|of| places().fold(DVec2::ZERO, of));
     let (centre, size) = ((least + most) / 2.0, most - least);
     let width_m = size.max_element() + 2.0 * AROUND_M;
-    let periods = |of: &dyn Fn(&&Instant) -> bool| {
-        let times: Vec<f64> = log.instants.iter().filter(of).map(|it| it.time_s).collect();
-        let mut periods: Vec<f64> = times.windows(2).map(|it| it[1] - it[0]).collect();
-        periods.sort_by(f64::total_cmp);
-        periods
-    };
-    let (reports, scans) = (periods(&|_| true), periods(&|it| it.scan.is_some()));
-    let period_s = reports.get(reports.len() / 2).copied().unwrap_or(1.0);
+    let mut periods: Vec<f64> =
+        log.instants.windows(2).map(|it| it[1].time_s - it[0].time_s).collect();
+    periods.sort_by(f64::total_cmp);
+    let period_s = periods.get(periods.len() / 2).copied().unwrap_or(1.0);
     let rate_hz = period_s.recip().clamp(RATES_HZ[0], RATES_HZ[1]);
-    // A log may hold fewer scans than its robot gave.
-    let longest_s = scans.iter().chain(&reports).copied().fold(0.0, f64::max);
-    let limit_s = longest_s.clamp(2.0 / rate_hz, LONGEST_PAUSE_S);
     let beams = log.beams();
+    // A log may hold fewer reports than its robot gave, so they are late after the longest time.
     let own = format!(
-        "[robot]\nprotocol = 'json'\nrate_hz = {rate_hz:.2}\ncommand_limit_s = {limit_s:.2}\n\
+        "[robot]\nprotocol = 'json'\nrate_hz = {rate_hz:.2}\ncommand_limit_s = 5\n\
         [[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\n\
         field_of_view_deg = 180\nreach_m = 30\nbeams = {beams}\n"
     );
     let [x, y] = centre.to_array();
-    let target = places().next_back().unwrap_or_default();
     let text = format!(
-        "target = [{:.3}, {:.3}]\nperimeter.width_m = {width_m:.1}\nperimeter.centre = [{x:.1}, {y:.1}]\n{}",
-        target.x,
-        target.y,
+        "target = [0, 0]\nperimeter.width_m = {width_m:.1}\nperimeter.centre = [{x:.1}, {y:.1}]\n{}",
         robot.unwrap_or(&own)
     );
     Mission::parse(&text, "log.toml")
@@ -119,7 +100,7 @@ struct Driver<'a> {
     heard: u64,
     tick: u64,
     now_ns: u64,
-    stands: Vec<Stand>,
+    stands: Vec<(f64, String)>,
     pose: PoseSample,
 }
 
@@ -166,15 +147,7 @@ pub fn drive(log: &Log, mission: &Mission) -> Option<Drive> {
     let body = |pose: Pose2| moved(arm, moved(between(start, pose), back));
     let references = log.is_corrected.then(|| scanned().map(|it| body(it.laser)).collect());
     let Driver { mapper, stands, .. } = driver;
-    Some(Drive {
-        poses,
-        references,
-        fixes,
-        stands,
-        laser,
-        frame: mapper.frame(),
-        cells: mapper.state().cells.clone(),
-    })
+    Some(Drive { poses, references, fixes, stands, laser, mapper })
 }
 
 impl Driver<'_> {
@@ -252,11 +225,11 @@ impl Driver<'_> {
                 Effect::Decided { before, now: decision } => {
                     let stands =
                         decision.action >= Action::Stop && !PAUSES.contains(&decision.cause);
-                    if stands && before.action < Action::Stop {
+                    if stands && decision.cause != before.cause {
                         let words = self.link.explain(decision.cause, self.now_ns);
                         let why = words.unwrap_or_else(|| decision.cause.name().to_owned());
                         let time_s = (self.now_ns - BEGINS_NS) as f64 * 1e-9;
-                        self.stands.push(Stand { time_s, why });
+                        self.stands.push((time_s, why));
                         self.resume();
                     }
                 }

@@ -17,7 +17,7 @@ use common::{geometry::wrap_angle, kinematics::Pose2};
 use glam::DVec2;
 use thiserror::Error;
 
-pub use drive::{Drive, Stand, drive, mission};
+pub use drive::{Drive, drive, mission};
 pub use judge::{Judged, judge};
 
 /// Log that cannot be tried.

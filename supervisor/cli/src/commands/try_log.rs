@@ -3,7 +3,6 @@ use std::{fs, path::PathBuf};
 use clap::Args;
 use common::{kinematics::Pose2, samples::PoseSample};
 use picture::{Facts, Scene};
-use serde::Serialize;
 use trial::{Drive, Judged, Log};
 
 use console::{
@@ -31,17 +30,9 @@ pub struct Arguments {
     json: bool,
 }
 
-#[derive(Serialize)]
-struct Row {
-    time_s: f64,
-    x_m: f64,
-    y_m: f64,
-    heading_rad: f64,
-    /// Standard deviations.
-    x_sd_m: f64,
-    y_sd_m: f64,
-    heading_sd_rad: f64,
-}
+/// Of `poses.csv`: seconds, metres, radians, and standard deviations.
+const COLUMNS: [&str; 7] =
+    ["time_s", "x_m", "y_m", "heading_rad", "x_sd_m", "y_sd_m", "heading_sd_rad"];
 
 pub fn main(arguments: &Arguments) -> Result {
     let log = Log::read(&arguments.log)?;
@@ -54,18 +45,22 @@ pub fn main(arguments: &Arguments) -> Result {
         )
     })?;
     let judged = trial::judge(&log, &drive);
+    let (frame, cells) = (drive.mapper.frame(), &drive.mapper.state().cells);
     if let Some(out) = &arguments.out {
         fs::create_dir_all(out)?;
         let mut rows = csv::Writer::from_path(out.join("poses.csv"))?;
-        for pose in &drive.poses {
-            rows.serialize(row(pose))?;
+        rows.write_record(COLUMNS)?;
+        for PoseSample { stamp, x_m, y_m, heading_rad, covariance, .. } in &drive.poses {
+            let [x_sd, _, _, y_sd, _, heading_sd] = covariance.map(f64::sqrt);
+            let time_s = stamp.time().seconds();
+            rows.serialize([time_s, *x_m, *y_m, *heading_rad, x_sd, y_sd, heading_sd])?;
         }
         rows.flush()?;
-        maps::save_believed(&out.join("map.yaml"), &mission, &drive.frame, &drive.cells)?;
+        maps::save_believed(&out.join("map.yaml"), &mission, &frame, cells)?;
         let believed: Vec<Pose2> = drive.poses.iter().map(PoseSample::pose).collect();
         let svg = picture::svg(&Scene {
             mission: &mission,
-            grid: Some((drive.frame, &drive.cells)),
+            grid: Some((frame, cells)),
             field: None,
             believed: &believed,
             covariance: None,
@@ -88,19 +83,6 @@ pub fn main(arguments: &Arguments) -> Result {
     print_text(if arguments.json { json_lines(&[&judged])? } else { text(&judged, &drive) })
 }
 
-fn row(pose: &PoseSample) -> Row {
-    let [xx, _, _, yy, _, heading] = pose.covariance.map(f64::sqrt);
-    Row {
-        time_s: pose.stamp.time().seconds(),
-        x_m: pose.x_m,
-        y_m: pose.y_m,
-        heading_rad: pose.heading_rad,
-        x_sd_m: xx,
-        y_sd_m: yy,
-        heading_sd_rad: heading,
-    }
-}
-
 fn text(judged: &Judged, drive: &Drive) -> String {
     let metres = |it: Option<f64>| it.map_or("-".to_owned(), |it| format!("{it:.3} m"));
     let mut text = format!(
@@ -120,8 +102,8 @@ fn text(judged: &Judged, drive: &Drive) -> String {
         judged.blur_ratio,
         judged.false_stands,
     );
-    for stand in &drive.stands {
-        text += &format!("  at {:.1} s: {}\n", stand.time_s, stand.why);
+    for (time_s, why) in &drive.stands {
+        text += &format!("  at {time_s:.1} s: {why}\n");
     }
     text
 }
