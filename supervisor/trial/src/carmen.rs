@@ -31,7 +31,7 @@ struct Reading {
 /// Reads a log.
 ///
 /// # Errors
-/// For a file that cannot be read, is no log, or has a line that is no message.
+/// Returns an error if the file cannot be read, or if a line is no message of CARMEN.
 pub(crate) fn read(file: &Path) -> Result<Log, LogError> {
     let unreadable = |cause| LogError::Unreadable { file: file.to_owned(), cause };
     let mut lines = BufReader::new(File::open(file).map_err(unreadable)?);

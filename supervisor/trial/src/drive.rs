@@ -14,7 +14,7 @@ use glam::DVec2;
 use link::step::{Effect, Entry, Event, Link, State};
 use mapper::step::{Input, Mapper, Scan, Tick};
 
-use crate::{Instant, Log, between, moved};
+use crate::{Instant, Log, between, median, moved};
 
 /// Mission time of the log's first instant.
 const BEGINS_NS: u64 = 1_000_000_000;
@@ -27,11 +27,16 @@ const RATES_HZ: [f64; 2] = [1.0, 10.0];
 /// Space around the odometry, metres.
 const AROUND_M: f64 = 15.0;
 
-/// What a log's pause looks like: no fault of the robot.
-const PAUSES: [Cause; 4] =
-    [Cause::RobotLost, Cause::CommandStale, Cause::FramesSilent, Cause::RangeSilent];
+/// Causes that a log's pause has, and then a log that goes on although the link stops it.
+const PAUSES: [Cause; 5] = [
+    Cause::RobotLost,
+    Cause::CommandStale,
+    Cause::FramesSilent,
+    Cause::RangeSilent,
+    Cause::RobotDoesNotStop,
+];
 
-/// What came of a log.
+/// Result of a driven log.
 #[derive(Debug)]
 pub struct Drive {
     /// Where the robot believes to be at each scan, once it is matched.
@@ -51,16 +56,14 @@ pub struct Drive {
 /// `robot` holds the tables of a robot of one's own.
 ///
 /// # Errors
-/// If they are no mission.
+/// Returns an error if these tables are no valid mission.
 pub fn mission(log: &Log, robot: Option<&str>) -> Result<Mission, MissionError> {
     let places = || log.instants.iter().map(|it| it.odometry.position);
     let [least, most] = [DVec2::min, DVec2::max].map(|of| places().fold(DVec2::ZERO, of));
     let (centre, size) = ((least + most) / 2.0, most - least);
     let width_m = size.max_element() + 2.0 * AROUND_M;
-    let mut periods: Vec<f64> =
-        log.instants.windows(2).map(|it| it[1].time_s - it[0].time_s).collect();
-    periods.sort_by(f64::total_cmp);
-    let period_s = periods.get(periods.len() / 2).copied().unwrap_or(1.0);
+    let periods = log.instants.windows(2).map(|it| it[1].time_s - it[0].time_s);
+    let period_s = median(periods).unwrap_or(1.0);
     let rate_hz = period_s.recip().clamp(RATES_HZ[0], RATES_HZ[1]);
     let beams = log.beams();
     // A log may hold fewer reports than its robot gave, so they are late after the longest time.
@@ -137,15 +140,14 @@ pub fn drive(log: &Log, mission: &Mission) -> Option<Drive> {
             poses.push(pose);
         }
     }
-    let scanned = || log.instants.iter().filter(|it| it.scan.is_some());
-    let start = scanned().next()?.laser;
+    let start = log.scanned().next()?.laser;
     let arm = Pose2 {
         position: laser.mount.forward_m * DVec2::from_angle(laser.mount.bearing_rad),
         heading: 0.0,
     };
     let back = between(arm, Pose2::default());
     let body = |pose: Pose2| moved(arm, moved(between(start, pose), back));
-    let references = log.is_corrected.then(|| scanned().map(|it| body(it.laser)).collect());
+    let references = log.is_corrected.then(|| log.scanned().map(|it| body(it.laser)).collect());
     let Driver { mapper, stands, .. } = driver;
     Some(Drive { poses, references, fixes, stands, laser, mapper })
 }

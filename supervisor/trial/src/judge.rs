@@ -6,7 +6,7 @@ use common::kinematics::Pose2;
 use glam::DVec2;
 use serde::Serialize;
 
-use crate::{Log, between, drive::Drive};
+use crate::{Log, between, drive::Drive, median};
 
 /// Side of a cell of the blur, metres.
 const CELL_M: f64 = 0.1;
@@ -35,8 +35,7 @@ pub struct Judged {
 
 /// Judges the poses of a drive.
 pub fn judge(log: &Log, drive: &Drive) -> Judged {
-    let scanned = || log.instants.iter().filter(|it| it.scan.is_some());
-    let odometry: Vec<_> = scanned().map(|it| it.odometry).collect();
+    let odometry: Vec<_> = log.scanned().map(|it| it.odometry).collect();
     let poses: Vec<_> = drive.poses.iter().map(|it| it.pose()).collect();
     let references = drive.references.as_deref();
     let error = |poses: &[Pose2], way_m| error_over(references?, poses, way_m);
@@ -72,24 +71,19 @@ fn error_over(references: &[Pose2], poses: &[Pose2], way_m: f64) -> Option<f64> 
         Some(*gone)
     });
     let gone: Vec<f64> = std::iter::once(0.0).chain(gone).collect();
-    let mut errors: Vec<f64> = Vec::new();
-    for (from, begun) in gone.iter().enumerate() {
+    let errors = gone.iter().enumerate().map_while(|(from, begun)| {
         let to = gone.partition_point(|it| *it < begun + way_m);
-        if to >= poses.len() {
-            break;
-        }
-        let of = |poses: &[Pose2]| between(poses[from], poses[to]).position;
-        errors.push(of(poses).distance(of(references)));
-    }
-    errors.sort_by(f64::total_cmp);
-    errors.get(errors.len() / 2).copied()
+        let of = |poses: &[Pose2]| Some(between(poses[from], *poses.get(to)?).position);
+        Some(of(poses)?.distance(of(references)?))
+    });
+    median(errors)
 }
 
 /// Counts the cells that the points of all scans touch.
 fn cells(log: &Log, drive: &Drive, poses: &[Pose2]) -> usize {
     let (first_rad, step_rad) = drive.laser.fan();
     let mut touched = BTreeSet::new();
-    let scans = log.instants.iter().filter_map(|it| it.scan.as_ref());
+    let scans = log.scanned().filter_map(|it| it.scan.as_ref());
     for (scan, pose) in scans.zip(poses) {
         let laser = drive.laser.mount.on(*pose);
         for (beam, range) in scan.iter().enumerate() {

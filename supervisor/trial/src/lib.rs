@@ -55,7 +55,7 @@ impl Log {
     /// Reads a log.
     ///
     /// # Errors
-    /// For a file that cannot be read, is no log, or holds no scans.
+    /// Returns an error if the file cannot be read, is no log, or holds no scans.
     pub fn read(file: &Path) -> Result<Self, LogError> {
         let mut log = carmen::read(file)?;
         let first = log.instants.iter().position(|it| it.scan.is_some());
@@ -66,8 +66,19 @@ impl Log {
 
     /// Returns the number of beams of its first scan.
     pub fn beams(&self) -> usize {
-        self.instants.iter().find_map(|it| Some(it.scan.as_ref()?.len())).unwrap_or_default()
+        self.scanned().find_map(|it| Some(it.scan.as_ref()?.len())).unwrap_or_default()
     }
+
+    fn scanned(&self) -> impl Iterator<Item = &Instant> {
+        self.instants.iter().filter(|it| it.scan.is_some())
+    }
+}
+
+/// Returns the upper median, if there are any values.
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
 }
 
 /// Returns the motion from one pose to another, in the frame of the first.
