@@ -67,8 +67,10 @@ pub fn of(stage: &str) -> impl Iterator<Item = &'static Fault> {
     TABLE.iter().filter(move |fault| fault.stage.is_none_or(|its| its == stage))
 }
 
-/// Fails if the stage has no such fault, or the robot is real and the request does not confirm
-/// that.
+/// Returns the fault to inject, or the answer that refuses it.
+///
+/// # Errors
+/// If the stage has no such fault, or the robot is real and the request does not confirm that.
 pub fn admit(
     request: &FaultSample,
     stage: &str,

@@ -19,12 +19,12 @@ impl MissionTime {
         self.0 as f64 * 1e-9
     }
 
-    /// Negative values and NaN give zero.
+    /// Converts seconds; negative values and NaN give zero.
     pub fn from_seconds(seconds: f64) -> Self {
         Self((seconds.max(0.0) * 1e9) as u64)
     }
 
-    /// Zero if `earlier` is later.
+    /// Returns the time since `earlier`; zero if `earlier` is later.
     pub fn since(self, earlier: Self) -> Duration {
         Duration::from_nanos(self.0.saturating_sub(earlier.0))
     }

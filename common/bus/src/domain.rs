@@ -118,7 +118,7 @@ impl Domain {
         }
     }
 
-    /// True if unknown.
+    /// Returns whether the robot has a supervisor; true if unknown.
     pub fn is_supervised(&self) -> bool {
         !matches!(self.supervision(), Ok(Supervision::None))
     }

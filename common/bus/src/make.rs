@@ -188,7 +188,7 @@ impl Bus {
         self.lost.get()
     }
 
-    /// Also true after the run has ended.
+    /// Returns whether another bus replaced this one or the run has ended.
     pub fn is_replaced(&self) -> bool {
         let Medium::Shared { instance, .. } = &self.medium else { return false };
         BusInstance::current(&instance.domain).map_or(true, |now| now != *instance)

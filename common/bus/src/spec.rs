@@ -47,7 +47,7 @@ pub const OPERATOR: &str = "operator";
 pub const SUPERVISOR: &str = "supervisor";
 
 impl Spec {
-    /// Zero if it is not republished.
+    /// Returns the republishing interval of an unchanged topic; zero if none.
     pub const fn restated_every(&self) -> Duration {
         if let Rate::OnChange { again_after, .. } = self.rate {
             again_after
@@ -56,7 +56,7 @@ impl Spec {
         }
     }
 
-    /// Zero if there is none.
+    /// Returns the least interval of published changes; zero if none.
     pub const fn changes_at_most_every(&self) -> Duration {
         match self.rate {
             Rate::OnChange { at_most_every, .. } => at_most_every,

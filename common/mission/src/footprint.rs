@@ -78,7 +78,7 @@ impl Footprint {
         [left.min(right), left.max(right)]
     }
 
-    /// At most `step_m` apart.
+    /// Returns points of the outline at most `step_m` apart.
     pub fn outline(&self, step_m: f64) -> impl Iterator<Item = DVec2> + '_ {
         self.edges().flat_map(move |(from, to)| {
             let steps = (from.distance(to) / step_m).ceil().max(1.0) as u32;

@@ -124,7 +124,7 @@ rows! {
 }
 
 impl Zone {
-    /// Metres to its edge; negative inside.
+    /// Returns the distance to its edge, metres; negative inside.
     pub fn clearance(&self, point: DVec2) -> f64 {
         let (mut nearest, mut is_inside) = (f64::INFINITY, false);
         for (from, to) in ring(&self.points) {
@@ -191,7 +191,8 @@ impl Shapes {
         shapes
     }
 
-    /// Metres to the nearest surface: negative inside drums and boxes, infinite without shapes.
+    /// Returns the distance to the nearest surface, metres: negative inside drums and boxes,
+    /// infinite without shapes.
     pub fn clearance(&self, point: DVec2) -> f64 {
         self.pieces().map(|piece| piece.clearance(point)).fold(f64::INFINITY, f64::min)
     }
@@ -206,7 +207,7 @@ pub enum Piece<'a> {
 }
 
 impl Piece<'_> {
-    /// Metres to its surface; negative inside.
+    /// Returns the distance to its surface, metres; negative inside.
     pub fn clearance(&self, point: DVec2) -> f64 {
         match self {
             Self::Drum(drum) => drum.at.distance(point) - drum.radius_m,

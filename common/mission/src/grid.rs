@@ -75,7 +75,7 @@ impl Window {
         }
     }
 
-    /// Row by row.
+    /// Returns the cells row by row.
     pub fn cells(self) -> impl Iterator<Item = Cell> {
         let columns = self.col..self.col + self.width;
         (self.row..self.row + self.height)
@@ -134,12 +134,12 @@ impl GridFrame {
         self.centre + offset * self.resolution_m
     }
 
-    /// Lower left.
+    /// Returns the lower left corner of the map.
     pub fn corner(&self) -> DVec2 {
         self.centre_of(Cell { col: 0, row: 0 }) - self.resolution_m / 2.0
     }
 
-    /// In a row-major slice of the whole map.
+    /// Returns the index in a row-major slice of the whole map.
     pub const fn index(&self, cell: Cell) -> usize {
         cell.row as usize * self.cells as usize + cell.col as usize
     }

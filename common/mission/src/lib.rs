@@ -323,7 +323,7 @@ impl Mission {
         GridFrame { cells, resolution_m: width_m / f64::from(cells), centre }
     }
 
-    /// Inside the perimeter, off its rim.
+    /// Returns whether a place is inside the perimeter, off its rim.
     pub fn contains(&self, place: DVec2) -> bool {
         let frame = self.grid_frame();
         frame.cell_at(place).is_some_and(|cell| !frame.is_rim(cell))
@@ -557,7 +557,7 @@ impl Mission {
         self.robot.body()
     }
 
-    /// In the mission or its model.
+    /// Returns whether the mission or its model states the base's response.
     pub fn states_response(&self) -> bool {
         let ResponseKeys { delay_s, acceleration_m_s2, .. } = self.robot.response;
         let is_written = delay_s.is_some() && acceleration_m_s2.is_some();

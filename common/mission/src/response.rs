@@ -166,7 +166,7 @@ impl ModelledSpeed {
         self.speed
     }
 
-    /// Oldest first, with their times of effect.
+    /// Returns the pending commands, oldest first, with their times of effect.
     pub fn pending(&self) -> impl Iterator<Item = (f64, f64)> {
         self.pending.iter().copied()
     }

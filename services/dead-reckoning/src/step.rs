@@ -109,7 +109,7 @@ pub struct Reckoned {
     pub(crate) doubted: Option<String>,
 }
 
-/// By (20) and (21).
+/// Dead reckoning by (20) and (21).
 #[derive(Debug)]
 pub struct DeadReckoning {
     body: Body,

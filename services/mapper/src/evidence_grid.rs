@@ -423,7 +423,7 @@ fn side_of(axis: DVec2) -> u8 {
     (axis.to_angle() / TAU * 256.0).rem_euclid(256.0) as u8
 }
 
-/// Radians.
+/// Returns the angle between two sides, radians.
 fn apart(a: u8, b: u8) -> f64 {
     let steps = a.wrapping_sub(b);
     f64::from(steps.min(steps.wrapping_neg())) * TAU / 256.0

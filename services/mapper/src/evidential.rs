@@ -101,7 +101,7 @@ impl Evidential {
         4 * (1 + self.others()) * self.ground.lattice.area() + ClearBeams::SAVED_BYTES + 128
     }
 
-    /// Fails for another mission's map.
+    /// Completes a restored map; fails for another mission's.
     pub(crate) fn complete(&self, map: &mut EvidenceMap) -> Result<(), ForeignState> {
         let lattice = self.ground.lattice;
         let fits = map.others.len() == self.others() && map.grids().all(|grid| grid.fits(&lattice));

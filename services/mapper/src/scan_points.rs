@@ -16,7 +16,7 @@ const STRAIGHT: f64 = 0.5;
 /// Number of points from which a piece has its whole vote.
 const VOTERS: usize = 4;
 
-/// In the robot's frame.
+/// A point of a scan in the robot's frame.
 pub(crate) struct Point {
     pub at: DVec2,
     /// None for points off a line.

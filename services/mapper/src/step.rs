@@ -200,7 +200,10 @@ impl Mapper {
         &self.belief
     }
 
-    /// Fails and keeps the map if the belief is of another mission.
+    /// Restores the belief of an earlier process.
+    ///
+    /// # Errors
+    /// Returns an error and keeps the map if the belief is of another mission.
     pub fn restore(&mut self, mut belief: Belief) -> Result<(), ForeignState> {
         match (&self.belief.sensed, &mut belief.sensed) {
             (Sensed::Hits, Sensed::Hits) => {}

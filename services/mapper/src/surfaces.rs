@@ -15,7 +15,7 @@ pub(crate) struct Surface {
     pub seen_m: f64,
 }
 
-/// By square cells, row by row.
+/// Surfaces by square cells, row by row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Index {
     origin: DVec2,

@@ -18,7 +18,7 @@ const STEP_M: f64 = 0.05;
 const AHEAD_M: f64 = 0.8;
 /// Time until the car brakes, seconds: sonar period, radio period and wheel lag.
 const STOPS_WITHIN_S: f64 = 0.6;
-/// Of a drivable arc.
+/// Least free length of a drivable arc, metres.
 const LEAST_FREE_M: f64 = 0.1;
 
 #[derive(Debug)]
@@ -95,7 +95,7 @@ impl Arcs {
 }
 
 impl View<'_> {
-    /// A unit vector; zero if the field gives none.
+    /// Returns the field direction at `at`, a unit vector; zero if the field gives none.
     pub(crate) fn along(&self, at: DVec2) -> DVec2 {
         match self.guidance(at) {
             Guidance::Along(direction) | Guidance::WayOut(direction) => direction.into(),

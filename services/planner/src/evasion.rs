@@ -339,7 +339,7 @@ impl<'a> Scene<'a> {
         STEP_S * f64::from(way.steps) <= way.moved_s + self.evasion.fades_s
     }
 
-    /// If it brakes now, before any contact.
+    /// Returns whether the robot rests before any contact if it brakes now.
     fn rests(&self, mut way: Way) -> bool {
         while way.meets_s.is_infinite() && way.hazard_s.is_infinite() {
             let next_s = STEP_S * f64::from(way.steps + 1);

@@ -22,7 +22,7 @@ pub fn is_repeated(newest_ns: i64, stamp_ns: i64) -> bool {
 
 #[derive(Clone, Copy, Debug)]
 pub struct Odometry {
-    /// By the robot's clock.
+    /// Stamp by the robot's clock.
     pub stamp_ns: i64,
     /// x, y and heading.
     pub pose: [f64; 3],
@@ -31,7 +31,7 @@ pub struct Odometry {
 }
 
 impl Odometry {
-    /// The error says why there is none.
+    /// Reads odometry; the error says why there is none.
     pub fn read(payload: &[u8]) -> Result<Self, String> {
         let msg::Odometry { header, pose, twist, .. } = msg::Odometry::decode(payload)?;
         let heading = pose.pose.orientation.heading();
@@ -102,7 +102,7 @@ pub struct Scan {
 }
 
 impl Scan {
-    /// Fails if `payload` is no `sensor_msgs/LaserScan`.
+    /// Reads a scan. Fails if `payload` is no `sensor_msgs/LaserScan`.
     pub fn read(payload: &[u8]) -> Result<Self, Malformed> {
         let scan = LaserScan::decode(payload)?;
         Ok(Self {

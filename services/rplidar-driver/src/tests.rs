@@ -13,7 +13,7 @@ fn rplidar(set: &str) -> Rplidar {
     Rplidar::new(row, sensor, product)
 }
 
-/// Clockwise; 0 metres is no reading.
+/// Returns a node at `degrees` clockwise; 0 metres is no reading.
 fn node(degrees: u16, metres: f32) -> Vec<u8> {
     let quality = if metres > 0.0 { 20 } else { 0 };
     let distance_q2 = (metres * 4000.0) as u16;

@@ -23,7 +23,7 @@ impl Rangers {
         self.readings(SensorKind::Cone, &standard.ultrasonic.map(heard))
     }
 
-    /// None before a standard frame.
+    /// Returns None before a standard frame.
     pub(crate) fn take_custom(
         &self,
         custom: &CustomSensors,

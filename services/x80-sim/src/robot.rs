@@ -332,7 +332,7 @@ impl Robot {
         rplidar.map_or_else(Vec::new, |rplidar| rplidar.measured(&self.world, pose, now))
     }
 
-    /// For the ultrasonic rangers; none once they have listened.
+    /// Returns when the ultrasonic rangers listen for the next tick, if still ahead.
     fn listens_at(&self) -> Option<f64> {
         let age = self.physics.sonar.age_s;
         (age > 0.0 && self.ranging.heard.is_none()).then(|| self.next_tick_s() - age)

@@ -33,7 +33,7 @@ impl Surface {
         }
     }
 
-    /// None on the surface.
+    /// Returns the outward direction; none on the surface.
     pub fn outward(&self, point: DVec2) -> Option<DVec2> {
         let from = match *self {
             Self::Drum { at, .. } => at,

@@ -52,7 +52,7 @@ pub fn to_file(file: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// In UTC: year-month-day.
+/// Returns the UTC date as in logs: year-month-day.
 pub fn today() -> String {
     let mut now = String::new();
     // Infallible for a String.

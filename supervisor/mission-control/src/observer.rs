@@ -236,7 +236,7 @@ impl Record {
         self.contacts.iter().any(is_new)
     }
 
-    /// With both pose and guidance, oldest first.
+    /// Iterates over the ticks after `last` with both pose and guidance, oldest first.
     pub(crate) fn ticks_since(
         &self,
         last: Option<u64>,

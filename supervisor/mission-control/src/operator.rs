@@ -352,7 +352,7 @@ pub fn restart(robot: &RobotName, stage: &str) -> Result {
     ask(robot, RequestSample { stage: name(stage), ..request(RequestKind::Restart) })
 }
 
-/// Now, or after its present targets if `appends`.
+/// Sends the robot to `points` in turn: now, or after its present targets if `appends`.
 pub fn send_to(robot: &RobotName, points: &[TargetPoint], appends: bool) -> Result {
     let kind = if appends { RequestKind::Append } else { RequestKind::Goto };
     ask_with(robot, request(kind), points)

@@ -353,7 +353,7 @@ impl StallWatch {
         (self.cut_off_since, self.waits_since) = (None, None);
     }
 
-    /// Within [`FIELD_WITHIN`].
+    /// Returns whether the robot waits for a field within [`FIELD_WITHIN`].
     fn waits_for_field(&mut self, pose: &PoseSample, guidance: &GuidanceSample) -> bool {
         if guidance.status() != GuidanceStatus::Waiting {
             self.waits_since = None;

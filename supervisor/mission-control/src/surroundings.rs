@@ -82,7 +82,7 @@ pub trait Surroundings {
         None
     }
 
-    /// After the bus and before the stages.
+    /// Starts the consumer of all samples, after the bus and before the stages.
     fn attach_consumer(&mut self) {}
 
     /// Waits until the consumer has read all samples.

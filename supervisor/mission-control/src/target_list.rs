@@ -23,7 +23,7 @@ pub enum TargetOutcome {
     Reached,
     /// The ground truth contradicts the reported arrival.
     WrongPlace,
-    /// As [`Outcome::ReachedUnsure`].
+    /// The robot is unsure of its reported arrival, as in [`Outcome::ReachedUnsure`].
     ReachedUnsure,
     /// An operator named another target first.
     Replaced,

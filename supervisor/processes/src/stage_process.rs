@@ -45,7 +45,7 @@ pub(crate) struct StageProcess {
     hung: Option<Now>,
     /// Whether the last beat announced a stop on request.
     pub stopping: bool,
-    /// In the previous iteration.
+    /// Whether the previous iteration found the process ended.
     found_ended: bool,
 }
 

@@ -76,7 +76,8 @@ impl StageProcesses {
         self.stages.iter().position(|it| it.stage.name == stage)
     }
 
-    /// In order. External stages start by themselves.
+    /// Starts every down stage, in order, from `first_tick` on. External stages start by
+    /// themselves.
     pub fn start_all(&mut self, first_tick: u64) {
         self.ending = false;
         if self.starter == Starter::External {

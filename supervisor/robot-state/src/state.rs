@@ -131,7 +131,7 @@ impl RobotState {
         self.events.drain()
     }
 
-    /// By the newest pose.
+    /// Returns the mission time of the newest pose, seconds.
     pub const fn now_s(&self) -> f64 {
         self.events.now_s
     }

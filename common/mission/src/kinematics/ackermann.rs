@@ -18,7 +18,7 @@ pub struct Ackermann {
 }
 
 impl Ackermann {
-    /// For the driven axle's midpoint, metres.
+    /// Returns the radius of the driven axle's midpoint, metres.
     pub fn least_turning_radius(&self) -> f64 {
         self.wheelbase / self.steering_limit.tan()
     }

@@ -16,7 +16,7 @@ impl Quaternion {
         Self { z, w, ..Self::default() }
     }
 
-    /// Radians.
+    /// Returns the heading, radians.
     pub fn heading(&self) -> Option<f64> {
         let Self { x, y, z, w } = self;
         let length = [x, y, z, w].iter().map(|part| *part * *part).sum::<f64>().sqrt();

@@ -38,7 +38,7 @@ impl Lattice {
         }
     }
 
-    /// First row at the top, cells `cell` units wide.
+    /// Creates an image lattice from `corner`, first row at the top, cells `cell` units wide.
     pub(super) fn of_image((cols, rows): (usize, usize), corner: DVec2, cell: f64) -> Self {
         Self {
             cols,

@@ -124,7 +124,7 @@ impl Reading {
     }
 }
 
-/// At the beginning of a line of a log.
+/// Returns the time at the beginning of a line of a log.
 fn written(line: &str) -> Option<SystemTime> {
     humantime::parse_rfc3339(line.split_whitespace().next()?).ok()
 }

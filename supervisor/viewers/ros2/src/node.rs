@@ -227,7 +227,7 @@ impl<Id: Copy + Ord> Node<Id> {
     }
 }
 
-/// Names without a leading slash are below the namespace.
+/// Returns the absolute name. Names without a leading slash are below the namespace.
 pub fn full_name(namespace: &str, name: &str) -> String {
     match namespace.trim_matches('/') {
         _ if name.starts_with('/') => name.to_owned(),

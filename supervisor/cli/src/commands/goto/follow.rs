@@ -84,7 +84,7 @@ pub fn main(arguments: &Arguments, followed: Option<&RobotName>) -> Result {
     print_line(newest.unwrap_or_default().result())
 }
 
-/// Stamped with the time of `own`.
+/// Returns the beacon, stamped with the time of `own`.
 fn sample(own: &PoseSample, seen: &PoseSample, frame: Pose2) -> BeaconSample {
     let place = frame.position + frame.axis().rotate(seen.pose().position);
     BeaconSample {

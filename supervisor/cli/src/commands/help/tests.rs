@@ -62,7 +62,7 @@ impl Document {
         code
     }
 
-    /// As paths from the root.
+    /// Returns the link targets, as paths from the root.
     fn links(&self) -> Vec<PathBuf> {
         let targets = self.text.split("](").skip(1).map(|rest| rest.split(')').next().unwrap());
         let files = targets
