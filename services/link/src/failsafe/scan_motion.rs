@@ -92,12 +92,17 @@ impl ScanMotion {
                 self.unlike(hypothesis, (first, from), (newest, to))
             });
             let for_s = (at_s - newest_s).clamp(0.0, APART_S);
-            // NaN, from too few beams, tells nothing.
-            let tells = |it: &usize| (unlike[*it] - unlike[0]).abs() >= TELLS_M;
-            for hypothesis in (0..ALL.len()).filter(tells) {
-                self.better.fade(hypothesis, (-for_s / FADE_S).exp());
-                let better = (unlike[0] - FACTOR * unlike[hypothesis]) * for_s;
-                self.better.add(hypothesis, better, at_s);
+            for (it, (hypothesis, _)) in ALL.iter().enumerate() {
+                // A short delay is healthy.
+                let healthy = match hypothesis {
+                    Late(_) => unlike[0],
+                    _ => unlike[0].min(unlike[1]),
+                };
+                // NaN, from too few beams, tells nothing.
+                if (unlike[it] - healthy).abs() >= TELLS_M {
+                    self.better.fade(it, (-for_s / FADE_S).exp());
+                    self.better.add(it, (healthy - FACTOR * unlike[it]) * for_s, at_s);
+                }
             }
         }
         self.scans.push_back((at_s, scan.beams.clone()));
