@@ -1,6 +1,6 @@
 //! Main function of viewers and the laboratory.
 
-use std::process::ExitCode;
+use std::process::{ExitCode, Termination};
 
 use clap::Parser;
 
@@ -11,9 +11,9 @@ use crate::{
 };
 
 /// Answers a completion request, or logs to standard error from `log_level` up and calls `execute`.
-pub fn run<A: Parser>(log_level: &str, execute: fn(&A) -> Result<ExitCode>) -> ExitCode {
+pub fn run<A: Parser, T: Termination>(log_level: &str, execute: fn(&A) -> Result<T>) -> ExitCode {
     completion::answer_shell(A::command, Vec::new);
     let arguments = A::parse();
     logging::to_stderr(log_level);
-    failure::report(execute(&arguments))
+    failure::report(execute(&arguments).map(Termination::report))
 }

@@ -8,12 +8,12 @@ mod live;
 #[cfg(test)]
 mod tests;
 
-use std::{net::SocketAddr, process::ExitCode};
+use std::net::SocketAddr;
 
 use self::live::Live;
 use clap::Parser;
 use common::{domain::RobotName, signals::Signals};
-use console::{addresses, failure::Failure, output::print_text, stream::let_stages_go_first};
+use console::{addresses, failure::Result, output::print_text, stream::let_stages_go_first};
 
 /// Serve a robot live to Foxglove or Lichtblick.
 ///
@@ -43,10 +43,9 @@ pub struct Arguments {
 
 const LAYOUT: &str = include_str!("../layout.json");
 
-pub fn serve(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub fn serve(arguments: &Arguments) -> Result {
     if arguments.layout {
-        print_text(LAYOUT)?;
-        return Ok(ExitCode::SUCCESS);
+        return print_text(LAYOUT);
     }
     let_stages_go_first();
     let mut signals = Signals::that_end()?;
@@ -57,5 +56,5 @@ pub fn serve(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     print_text(format!("ws://{address}\n"))?;
     live.serve(&arguments.robot.domain(), &mut || signals.came());
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }

@@ -20,7 +20,7 @@ mod shared;
 #[cfg(test)]
 mod tests;
 
-use std::{net::SocketAddr, process::ExitCode, sync::Arc};
+use std::{net::SocketAddr, sync::Arc};
 
 use clap::Parser;
 use common::{domain::RobotName, signals::Signals};
@@ -52,12 +52,12 @@ pub struct Arguments {
     behind_proxy: Option<String>,
 }
 
-pub fn serve(arguments: &Arguments) -> Result<ExitCode> {
+pub fn serve(arguments: &Arguments) -> Result {
     let_stages_go_first();
     let mut signals = Signals::that_end()?;
     let driven = arguments.robot.clone();
     let page = Page::open(arguments, Arc::new(move |order| operator::perform(&driven, order)))?;
     print_line(format_args!("{}kept in {}", page.access.addresses(), page.kept.display()))?;
     robot::follow(&arguments.robot.domain(), &page.shared, &mut || signals.came());
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }

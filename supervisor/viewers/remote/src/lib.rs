@@ -18,8 +18,6 @@ mod show;
 mod tests;
 mod wire;
 
-use std::process::ExitCode;
-
 use clap::{Parser, Subcommand};
 
 use console::failure::Result;
@@ -46,11 +44,10 @@ enum What {
     List(list::Arguments),
 }
 
-pub fn execute(arguments: &Arguments) -> Result<ExitCode> {
+pub fn execute(arguments: &Arguments) -> Result {
     match &arguments.what {
-        What::Serve(arguments) => serve::serve(arguments)?,
-        What::Show(arguments) => show::show(arguments)?,
-        What::List(arguments) => list::list(arguments)?,
+        What::Serve(arguments) => serve::serve(arguments),
+        What::Show(arguments) => show::show(arguments),
+        What::List(arguments) => list::list(arguments),
     }
-    Ok(ExitCode::SUCCESS)
 }

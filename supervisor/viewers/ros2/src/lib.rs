@@ -23,12 +23,12 @@ mod shown;
 mod tests;
 mod topics;
 
-use std::{net::Ipv4Addr, process::ExitCode};
+use std::net::Ipv4Addr;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
 use common::{address::domain_of_environment, domain::RobotName, signals::Signals};
 
-use console::{failure::Failure, item::item, output::print_text, stream::let_stages_go_first};
+use console::{failure::Result, item::item, output::print_text, stream::let_stages_go_first};
 
 use self::topics::{Accept, Frames, Spec, TABLE};
 
@@ -106,7 +106,7 @@ pub fn topics() -> String {
     TABLE.iter().map(row).collect()
 }
 
-pub fn show(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub fn show(arguments: &Arguments) -> Result {
     let text = match &arguments.command {
         _ if arguments.topics => topics(),
         _ if arguments.rviz => RVIZ.to_owned(),
@@ -116,11 +116,10 @@ pub fn show(arguments: &Arguments) -> Result<ExitCode, Failure> {
         }
         Some(Command::Planner(_)) | None => return join(arguments),
     };
-    print_text(&text)?;
-    Ok(ExitCode::SUCCESS)
+    print_text(text)
 }
 
-fn join(arguments: &Arguments) -> Result<ExitCode, Failure> {
+fn join(arguments: &Arguments) -> Result {
     let mut signals = Signals::that_end()?;
     let domain = arguments.domain.map_or_else(domain_of_environment, Ok)?;
     let mut command = Arguments::command();
@@ -134,5 +133,5 @@ fn join(arguments: &Arguments) -> Result<ExitCode, Failure> {
         let_stages_go_first();
         bridge::serve(network, (arguments, parameters), &mut ended)?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }

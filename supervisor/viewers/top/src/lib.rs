@@ -14,7 +14,6 @@ mod view;
 
 use std::{
     io::{self, IsTerminal as _},
-    process::ExitCode,
     time::{Duration, Instant},
 };
 
@@ -63,15 +62,14 @@ enum TopError {
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 const DRAW_EVERY: Duration = Duration::from_millis(200);
 
-pub fn show_on_terminal(arguments: &Arguments) -> Result<ExitCode> {
+pub fn show_on_terminal(arguments: &Arguments) -> Result {
     if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
         let message =
             "top needs a terminal; elsewhere use `firsthand status` and `firsthand topic hz`";
         return refuse("no-terminal", message);
     }
     let_stages_go_first();
-    show(&arguments.robot)?;
-    Ok(ExitCode::SUCCESS)
+    Ok(show(&arguments.robot)?)
 }
 
 /// Shows `robot` until q is pressed, a signal comes, or the terminal is closed.
