@@ -174,8 +174,8 @@ impl Command {
 }
 
 fn listed() -> String {
-    let all = Command::augment_subcommands(clap::Command::new(""));
-    let all = all.subcommands(companions::TABLE.iter().map(companions::Companion::command));
+    let all = Command::augment_subcommands(clap::Command::new(""))
+        .subcommands(companions::TABLE.iter().map(companions::Companion::command));
     let mut text = String::new();
     for (heading, names) in GROUPS {
         text += &format!("{heading}:\n");

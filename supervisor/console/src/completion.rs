@@ -68,10 +68,9 @@ fn completer(argument: &Arg, pages: fn() -> Vec<String>) -> Option<ArgValueCompl
     }
     Some(match argument.get_id().as_str() {
         "stage" => named(stage_names),
-        "topic" | "topics" => named(|| {
-            let topics = topics::TABLE.iter();
-            topics.map(|topic| topic.spec().name.to_owned()).collect()
-        }),
+        "topic" | "topics" => {
+            named(|| topics::TABLE.iter().map(|topic| topic.spec().name.to_owned()).collect())
+        }
         "mission" => ArgValueCompleter::new(|current: &OsStr| {
             let files = PathCompleter::file().complete(current);
             let shipped = missions::SHIPPED.map(|(name, _)| name.to_owned());
@@ -89,11 +88,13 @@ fn named(names: impl Fn() -> Vec<String> + Send + Sync + 'static) -> ArgValueCom
 }
 
 fn candidates(current: &str, names: Vec<String>) -> Vec<CompletionCandidate> {
-    let fit = names.into_iter().filter(|name| name.starts_with(current));
-    fit.map(CompletionCandidate::new).collect()
+    names
+        .into_iter()
+        .filter(|name| name.starts_with(current))
+        .map(CompletionCandidate::new)
+        .collect()
 }
 
 fn stage_names() -> Vec<String> {
-    let stages = stages::TABLE.iter();
-    stages.map(|stage| stage.name.to_owned()).collect()
+    stages::TABLE.iter().map(|stage| stage.name.to_owned()).collect()
 }

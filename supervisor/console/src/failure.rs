@@ -147,8 +147,7 @@ fn users<'a>(shared: &Path, robot: &'a str) -> impl Iterator<Item = u32> + use<'
     robots::entries(shared).filter_map(move |entry| {
         let name = entry.file_name();
         let (user, rest) = name.to_str()?.strip_prefix("fh")?.split_once('_')?;
-        let named = rest.strip_prefix(robot)?.starts_with('_');
-        named.then_some(user.parse().ok()?)
+        rest.strip_prefix(robot)?.starts_with('_').then_some(user.parse().ok()?)
     })
 }
 

@@ -72,8 +72,9 @@ fn stderr_layer() -> AnyLayer {
 
 fn start(layers: Vec<AnyLayer>, default: &str) {
     // The ROS 2 library is too verbose.
-    let wanted = std::env::var("FIRSTHAND_LOG").ok().and_then(|wanted| wanted.parse().ok());
-    let filter: Targets = wanted
+    let filter: Targets = std::env::var("FIRSTHAND_LOG")
+        .ok()
+        .and_then(|wanted| wanted.parse().ok())
         .or_else(|| format!("rustdds=error,{default}").parse().ok())
         .unwrap_or_else(|| Targets::new().with_default(Level::INFO));
     tracing_subscriber::registry().with(layers).with(filter).init();

@@ -35,8 +35,7 @@ fn names() -> String {
 }
 
 pub fn shipped(name: &str) -> Option<&'static str> {
-    let found = SHIPPED.iter().find(|(shipped, _)| *shipped == name);
-    found.map(|(_, text)| *text)
+    SHIPPED.iter().find(|(shipped, _)| *shipped == name).map(|(_, text)| *text)
 }
 
 /// Applies `KEY=VALUE` assignments, and the mission's calibration.

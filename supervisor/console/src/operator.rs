@@ -39,10 +39,10 @@ pub fn send(robot: &RobotName, stage: &str, signal: Signal) -> Result {
     operator::refuse_mirror(&domain)?;
     // A frozen supervisor publishes nothing.
     if stage == "supervisor" {
-        let holder = domain.supervisor();
-        let holder = holder
-            .map_err(|error| format!("cannot find the supervisor of robot {robot}: {error}"))?;
-        let pid = holder.ok_or_else(|| no_process(robot, stage))?;
+        let pid = domain
+            .supervisor()
+            .map_err(|error| format!("cannot find the supervisor of robot {robot}: {error}"))?
+            .ok_or_else(|| no_process(robot, stage))?;
         return Ok(signal_holder(pid, &domain.lock_file(), signal)
             .map_err(|error| cannot_signal(stage, pid, &error))?);
     }

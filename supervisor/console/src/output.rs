@@ -29,8 +29,7 @@ pub fn print_rows(values: &[impl Serialize], json: bool, text: impl Display) -> 
 }
 
 pub fn json_lines(values: &[impl Serialize]) -> serde_json::Result<String> {
-    let lines = values.iter().map(serde_json::to_string);
-    lines.map(|line| Ok(line? + "\n")).collect()
+    values.iter().map(serde_json::to_string).map(|line| Ok(line? + "\n")).collect()
 }
 
 /// Says `text` on standard error, after the name of the program.

@@ -31,10 +31,13 @@ impl Robot {
 pub fn own() -> (Vec<Robot>, Vec<Robot>) {
     // All robots of a user share one directory.
     let any = "any".parse().ok().map(Domain::of);
-    let shared = any.as_ref().and_then(|any| any.directory().parent());
-    let entries = shared.into_iter().flat_map(entries);
-    let names = entries.filter_map(|entry| entry.file_name().to_str()?.parse::<RobotName>().ok());
-    let mut names: Vec<_> = names.collect();
+    let mut names: Vec<_> = any
+        .as_ref()
+        .and_then(|any| any.directory().parent())
+        .into_iter()
+        .flat_map(entries)
+        .filter_map(|entry| entry.file_name().to_str()?.parse::<RobotName>().ok())
+        .collect();
     names.sort();
     names.into_iter().map(Robot::find).partition(|robot| robot.supervisor.is_some())
 }
@@ -63,10 +66,12 @@ fn users_in(directory: &Path, own: u32) -> Vec<u32> {
 }
 
 fn run_directory(supervisor: u32) -> Option<PathBuf> {
-    let opened = fs::read_dir(format!("/proc/{supervisor}/fd")).ok()?;
-    let files = opened.flatten().filter_map(|entry| fs::read_link(entry.path()).ok());
-    let mut logs = files.filter(|file| file.ends_with(SUPERVISOR_LOG));
-    Some(logs.next()?.parent()?.to_path_buf())
+    let log = fs::read_dir(format!("/proc/{supervisor}/fd"))
+        .ok()?
+        .flatten()
+        .filter_map(|entry| fs::read_link(entry.path()).ok())
+        .find(|file| file.ends_with(SUPERVISOR_LOG))?;
+    Some(log.parent()?.to_path_buf())
 }
 
 #[cfg(test)]

@@ -142,14 +142,16 @@ impl RunDirectory {
 const MOST_LEVELS: u32 = 8;
 
 fn size(directory: &Path, levels: u32) -> u64 {
-    let sizes = entries(directory).filter_map(|entry| {
-        // A link counts without its target.
-        let file = entry.metadata().ok()?;
-        let below = if file.is_dir() && levels > 0 { size(&entry.path(), levels - 1) } else { 0 };
-        // The kernel counts blocks of 512 bytes on every file system.
-        Some(file.blocks().saturating_mul(512).saturating_add(below))
-    });
-    sizes.fold(0, u64::saturating_add)
+    entries(directory)
+        .filter_map(|entry| {
+            // A link counts without its target.
+            let file = entry.metadata().ok()?;
+            let below =
+                if file.is_dir() && levels > 0 { size(&entry.path(), levels - 1) } else { 0 };
+            // The kernel counts blocks of 512 bytes on every file system.
+            Some(file.blocks().saturating_mul(512).saturating_add(below))
+        })
+        .fold(0, u64::saturating_add)
 }
 
 /// Fails if the directory holds an earlier run.
@@ -174,8 +176,7 @@ pub fn numbered(runs: &Path, name: &str) -> Result<PathBuf> {
     })?;
     let number = |entry: fs::DirEntry| {
         let file_name = entry.file_name();
-        let rest = file_name.to_str()?.strip_prefix(name)?;
-        rest.strip_prefix('-')?.parse::<u64>().ok()
+        file_name.to_str()?.strip_prefix(name)?.strip_prefix('-')?.parse::<u64>().ok()
     };
     let mut number = entries(runs).filter_map(number).max().unwrap_or_default() + 1;
     loop {

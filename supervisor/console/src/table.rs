@@ -22,14 +22,12 @@ impl<const N: usize> Table<N> {
 impl<const N: usize> Display for Table<N> {
     fn fmt(&self, to: &mut Formatter<'_>) -> Result {
         let widths: [usize; N] = std::array::from_fn(|column| {
-            let widths = self.rows.iter().map(|row| row[column].chars().count());
-            widths.max().unwrap_or_default()
+            self.rows.iter().map(|row| row[column].chars().count()).max().unwrap_or_default()
         });
         for row in &self.rows {
             let cells = row.iter().zip(widths).zip(self.to_the_right);
-            let cells = cells.map(|((cell, width), to_the_right)| match to_the_right {
-                true => format!("{cell:>width$}"),
-                false => format!("{cell:<width$}"),
+            let cells = cells.map(|((cell, width), to_the_right)| {
+                if to_the_right { format!("{cell:>width$}") } else { format!("{cell:<width$}") }
             });
             writeln!(to, "{}", cells.collect::<Vec<_>>().join("  ").trim_end())?;
         }

@@ -181,8 +181,12 @@ const NARROWEST: usize = 8;
 /// Draws table `rows` in columns that fit into `width`.
 fn drawn<'a>(rows: impl Iterator<Item = &'a str>, width: usize) -> Vec<String> {
     let cells = |row: &str| -> Vec<String> {
-        let row = row.trim().trim_matches('|').replace("\\|", "\u{1}");
-        row.split('|').map(|cell| cell.trim().replace('\u{1}', "|")).collect()
+        row.trim()
+            .trim_matches('|')
+            .replace("\\|", "\u{1}")
+            .split('|')
+            .map(|cell| cell.trim().replace('\u{1}', "|"))
+            .collect()
     };
     let rows: Vec<Vec<String>> = rows.map(cells).collect();
     let columns = rows.iter().map(Vec::len).max().unwrap_or_default();
@@ -196,8 +200,14 @@ fn drawn<'a>(rows: impl Iterator<Item = &'a str>, width: usize) -> Vec<String> {
         *widest -= 1;
     }
     let line = |cells: &[String]| {
-        let padded = cells.iter().zip(&widths).map(|(cell, &width)| format!("{cell:<width$}"));
-        padded.collect::<Vec<_>>().join("  ").trim_end().to_owned()
+        cells
+            .iter()
+            .zip(&widths)
+            .map(|(cell, &width)| format!("{cell:<width$}"))
+            .collect::<Vec<_>>()
+            .join("  ")
+            .trim_end()
+            .to_owned()
     };
     let mut drawn = Vec::new();
     for (nth, row) in rows.iter().enumerate() {

@@ -70,8 +70,9 @@ pub fn main(Arguments { address, out, protocol, robot }: &Arguments) -> Result {
     let text = seen.mission_at(&address.to_string());
     missions::parsed(&text, "what the robot says", &[])?;
     // A file that appeared meanwhile stays.
-    let written = File::create_new(out).and_then(|mut file| file.write_all(text.as_bytes()));
-    written.map_err(FileError::of("write", out))?;
+    File::create_new(out)
+        .and_then(|mut file| file.write_all(text.as_bytes()))
+        .map_err(FileError::of("write", out))?;
     let said: String = text.split_inclusive('\n').filter(|line| line.starts_with("# -")).collect();
     print_line(format_args!(
         "{said}wrote {place}; next:\n  1. correct its lines with MEASURE and PLACEHOLDER\n  2. firsthand check {place}\n  3. firsthand bring-up {place} --robot {robot} --write"

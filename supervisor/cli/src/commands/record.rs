@@ -74,11 +74,12 @@ impl FromStr for DiskBudget {
             "GB" => Some(1_000_000_000),
             _ => None,
         };
-        let bytes = unit.and_then(|unit| digits.parse::<u64>().ok()?.checked_mul(unit));
-        let bytes = bytes.filter(|bytes| *bytes >= LEAST);
-        bytes.map(Self).ok_or_else(|| {
-            format!("{text:?} is not a size of 500kB or more; give one such as 500MB or 2GB")
-        })
+        unit.and_then(|unit| digits.parse::<u64>().ok()?.checked_mul(unit))
+            .filter(|bytes| *bytes >= LEAST)
+            .map(Self)
+            .ok_or_else(|| {
+                format!("{text:?} is not a size of 500kB or more; give one such as 500MB or 2GB")
+            })
     }
 }
 
@@ -112,8 +113,12 @@ impl Wishes for Asks {
     }
 
     fn descriptors(&self) -> Vec<BorrowedFd<'_>> {
-        let supervisor = self.supervisor.as_ref().map(AsFd::as_fd);
-        supervisor.into_iter().chain([self.signals.as_fd()]).collect()
+        self.supervisor
+            .as_ref()
+            .map(AsFd::as_fd)
+            .into_iter()
+            .chain([self.signals.as_fd()])
+            .collect()
     }
 }
 
@@ -123,8 +128,10 @@ pub fn main(arguments: &Arguments) -> Result {
         become_child("recorder", supervisor)?;
         asks.supervisor = Some(io::stdin().as_fd().try_clone_to_owned()?.into());
     }
-    let chosen = arguments.topics.as_ref();
-    let chosen = chosen.map(|names| names.iter().map(|name| readable(name)).collect::<Result<_>>());
+    let chosen = arguments
+        .topics
+        .as_ref()
+        .map(|names| names.iter().map(|name| readable(name)).collect::<Result<_>>());
     let options = Options {
         domain: arguments.robot.domain(),
         out: arguments.out.clone(),

@@ -128,8 +128,8 @@ fn options(arguments: &Arguments) -> Result<Options> {
         })?;
         return resumed(arguments, found);
     }
-    let last = arguments.resume_last.then(|| runs::newest(&arguments.runs, &arguments.robot));
-    let last = last.flatten();
+    let last =
+        arguments.resume_last.then(|| runs::newest(&arguments.runs, &arguments.robot)).flatten();
     let mut is_cut_off = false;
     if let Some(cut) = last.as_ref().filter(|run| !run.has_ended()) {
         match resumed(arguments, fs::canonicalize(&cut.directory)?) {
@@ -146,8 +146,9 @@ fn options(arguments: &Arguments) -> Result<Options> {
         is_cut_off = true;
     }
     let mut mission = mission(arguments)?;
-    let same = last.filter(|run| mission.stay && run.mission.as_ref() == Some(&mission.name));
-    let place = same.and_then(|run| recovery::last_place(&run.directory, &mission));
+    let place = last
+        .filter(|run| mission.stay && run.mission.as_ref() == Some(&mission.name))
+        .and_then(|run| recovery::last_place(&run.directory, &mission));
     let waits = mission.stay && mission.straight_m() == 0.0 && mission.targets.is_empty();
     if let Some((place, _)) = &place {
         let heading_deg = wrap_angle(place.heading_rad).to_degrees();
@@ -249,8 +250,10 @@ fn refuse_without_memory(mission: &Mission) -> Result {
     /// Memory of all processes per cell, bytes: 1.84 GiB at 4096 x 4096.
     const PER_CELL: u64 = 118;
     let memory = fs::read_to_string("/proc/meminfo").unwrap_or_default();
-    let free = memory.lines().find_map(|line| line.strip_prefix("MemAvailable:"));
-    let free = free.and_then(|rest| rest.trim().strip_suffix(" kB")?.parse::<u64>().ok());
+    let free = memory
+        .lines()
+        .find_map(|line| line.strip_prefix("MemAvailable:"))
+        .and_then(|rest| rest.trim().strip_suffix(" kB")?.parse::<u64>().ok());
     let cells = mission.grid_frame().cells;
     let most = free.map_or(u64::MAX, |kb| (kb * 1024 / PER_CELL).isqrt());
     if u64::from(cells) <= most {

@@ -90,8 +90,10 @@ impl StageProcess {
 }
 
 fn subcommands() -> Vec<String> {
-    let all = Command::augment_subcommands(clap::Command::new("stage"));
-    all.get_subcommands().map(|it| it.get_name().to_owned()).collect()
+    Command::augment_subcommands(clap::Command::new("stage"))
+        .get_subcommands()
+        .map(|it| it.get_name().to_owned())
+        .collect()
 }
 
 fn signal(name: &str) -> Result<Signal, String> {

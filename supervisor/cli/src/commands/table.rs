@@ -83,9 +83,13 @@ fn topic_row(topic: &dyn AnyTopic) -> String {
 
 pub fn stages() -> String {
     let list = |topics: &[Topics]| {
-        let topics = topics.iter().copied().flatten();
-        let names: Vec<_> = topics.map(|topic| format!("`{}`", topic.spec().name)).collect();
-        names.join(", ")
+        topics
+            .iter()
+            .copied()
+            .flatten()
+            .map(|topic| format!("`{}`", topic.spec().name))
+            .collect::<Vec<_>>()
+            .join(", ")
     };
     let row = |stage: &stages::Stage| {
         let wiring = stage.wiring;

@@ -77,8 +77,12 @@ impl Logs {
     }
 
     pub fn next_line(&mut self) -> io::Result<Option<String>> {
-        let with_line = self.logs.iter_mut().filter(|log| log.head.is_some());
-        let Some(log) = with_line.min_by(|one, other| one.time.cmp(&other.time)) else {
+        let Some(log) = self
+            .logs
+            .iter_mut()
+            .filter(|log| log.head.is_some())
+            .min_by(|one, other| one.time.cmp(&other.time))
+        else {
             return Ok(None);
         };
         let line = log.head.take();

@@ -55,10 +55,11 @@ impl SummaryFile {
 
     pub fn write(mut self, text: &str) -> Result<(), String> {
         let (from, to) = (self.directory.join(UNFINISHED), self.directory.join(SUMMARY));
-        let written = self.file.write_all(text.as_bytes());
-        // Releases the rest of the reserved space.
-        let written = written.and_then(|()| self.file.set_len(text.len() as u64));
-        written.map_err(failed("write", &from))?;
+        self.file
+            .write_all(text.as_bytes())
+            // Releases the rest of the reserved space.
+            .and_then(|()| self.file.set_len(text.len() as u64))
+            .map_err(failed("write", &from))?;
         fs::rename(&from, &to).map_err(failed("make", &to))
     }
 }

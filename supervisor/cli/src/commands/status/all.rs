@@ -37,8 +37,8 @@ pub fn print(json: bool) -> Result {
     let (running, killed) = robots::own();
     // A frozen supervisor delays only its own row.
     let listed: Vec<_> = thread::scope(|scope| {
-        let asked = running.into_iter().map(|robot| scope.spawn(|| listed(robot)));
-        let asked: Vec<_> = asked.collect();
+        let asked: Vec<_> =
+            running.into_iter().map(|robot| scope.spawn(|| listed(robot))).collect();
         asked.into_iter().filter_map(|listed| listed.join().ok()).collect()
     });
     if listed.is_empty() && !json {

@@ -39,14 +39,17 @@ pub fn markdown(name: &str, text: &str) -> String {
             format!("| {} |\n|{}\n", columns.join(" | "), "---|".repeat(columns.len()))
         }
     };
-    let records = reader.records().flatten();
-    let rows = records.map(|row| line(name, &row.iter().skip(1).collect::<Vec<_>>()));
+    let rows =
+        reader.records().flatten().map(|row| line(name, &row.iter().skip(1).collect::<Vec<_>>()));
     header + &rows.collect::<String>()
 }
 
 pub fn results() -> String {
-    let printed = RESULTS.iter().map(|(name, text)| format!("{name}\n\n{}", markdown(name, text)));
-    printed.collect::<Vec<_>>().join("\n")
+    RESULTS
+        .iter()
+        .map(|(name, text)| format!("{name}\n\n{}", markdown(name, text)))
+        .collect::<Vec<_>>()
+        .join("\n")
 }
 
 /// Returns an item of a list, or a row of a table.

@@ -46,11 +46,13 @@ pub fn main(arguments: &Arguments) -> Result {
     let domain = arguments.robot.domain();
     let open = |bus: &Bus| {
         let now = Instant::now();
-        let opened = topics.iter().map(|topic| {
-            let rates = TopicRates::new(topic.spec(), now);
-            Ok((topic.any_reader(bus)?, rates))
-        });
-        opened.collect::<Result<Vec<_>, BusError>>()
+        topics
+            .iter()
+            .map(|topic| {
+                let rates = TopicRates::new(topic.spec(), now);
+                Ok((topic.any_reader(bus)?, rates))
+            })
+            .collect::<Result<Vec<_>, BusError>>()
     };
     // Topics that wake no reader are read when the link ends the tick.
     let mut follower =

@@ -70,9 +70,8 @@ fn on_one_line(value: &Value, most: usize) -> String {
             format!("[{}]{more}", shown.join(", "))
         }
         Value::Struct(fields) => {
-            let fields = fields.iter();
             let fields =
-                fields.map(|(name, value)| format!("{name}: {}", on_one_line(value, most)));
+                fields.iter().map(|(name, value)| format!("{name}: {}", on_one_line(value, most)));
             format!("{{{}}}", fields.collect::<Vec<_>>().join(", "))
         }
     }
