@@ -15,8 +15,9 @@ pub(crate) fn first_contact<'a>(
     truth: &'a [GroundTruthTick],
     mission: &Mission,
 ) -> Option<&'a GroundTruthTick> {
-    let contact = truth.get(truth.partition_point(|tick| tick.contacts == 0));
-    contact.filter(|_| !mission.simulation.goes_on_after_contact)
+    truth
+        .get(truth.partition_point(|tick| tick.contacts == 0))
+        .filter(|_| !mission.simulation.goes_on_after_contact)
 }
 
 pub(crate) struct Decided {
@@ -69,13 +70,11 @@ pub(crate) fn first(
         (it.stamp.tick, arrived(it.distance_m, beside))
     });
     let arrived_in = arrival.as_ref().map(|(tick, _)| *tick);
-    let late = timeout.tick(poses, truth);
-    let late = late.map(|tick| (tick, timeout.deadline.timed_out()));
+    let late = timeout.tick(poses, truth).map(|tick| (tick, timeout.deadline.timed_out()));
     // Of two events in one tick, the first in the list counts.
     let events = [contact, arrival, late, stall];
     let ticks_until = |pose: Option<&PoseSample>| {
-        let last = pose.and_then(|pose| truth_of(pose, truth));
-        last.map_or(truth.len(), |index| index + 1)
+        pose.and_then(|pose| truth_of(pose, truth)).map_or(truth.len(), |index| index + 1)
     };
     let Some((tick, ending)) = events.into_iter().flatten().min_by_key(|event| event.0) else {
         // The robot waits. How far it rolls after its newest tick depends on how its processes end.
@@ -99,8 +98,12 @@ pub(crate) fn first(
 
 /// Returns the ground-truth index of `pose`: same counts, nearest number.
 pub(crate) fn truth_of(pose: &PoseSample, truth: &[GroundTruthTick]) -> Option<usize> {
-    let shown = truth.iter().enumerate().filter(|(_, it)| it.is_of(pose));
-    shown.min_by_key(|(_, it)| it.heard_tick().abs_diff(pose.stamp.tick)).map(|(index, _)| index)
+    truth
+        .iter()
+        .enumerate()
+        .filter(|(_, it)| it.is_of(pose))
+        .min_by_key(|(_, it)| it.heard_tick().abs_diff(pose.stamp.tick))
+        .map(|(index, _)| index)
 }
 
 /// Returns the tick of the pose computed from `truth`, or the number it would have.

@@ -255,11 +255,13 @@ impl Record {
     }
 
     pub fn newest_tick(&self) -> Option<u64> {
-        let ticks = [
+        [
             self.pose.map(|pose| pose.stamp.tick),
             self.command.map(|command| command.stamp.tick),
             self.link.map(|link| link.stamp.tick),
-        ];
-        ticks.into_iter().flatten().max()
+        ]
+        .into_iter()
+        .flatten()
+        .max()
     }
 }

@@ -166,8 +166,7 @@ fn guard(domain: &Domain) -> Result<Operator> {
 
 /// Returns the stop guard's observation and its seconds of silence.
 pub fn sees(robot: &RobotName) -> Option<(String, u8)> {
-    let guard = Operator::connect(&robot.domain().guard_socket());
-    let guard = guard.ok().flatten()?;
+    let guard = Operator::connect(&robot.domain().guard_socket()).ok().flatten()?;
     guard.send(Request::Look).ok()?;
     loop {
         match guard.answer(PATIENCE).ok()?? {
@@ -253,21 +252,23 @@ fn robot_executable() -> PathBuf {
     let own = env::current_exe().unwrap_or_default();
     let is_viewer =
         own.file_name().is_some_and(|name| name.to_string_lossy().starts_with("firsthand-"));
-    let beside = is_viewer.then(|| executable::find("firsthand".as_ref()).ok()).flatten();
-    beside.unwrap_or_else(|| PathBuf::from("/proc/self/exe"))
+    is_viewer
+        .then(|| executable::find("firsthand".as_ref()).ok())
+        .flatten()
+        .unwrap_or_else(|| PathBuf::from("/proc/self/exe"))
 }
 
 /// Tells the supervisor of a stop in a separate process, because files of a damaged bus can kill a
 /// process.
 fn tell_supervisor(robot: &RobotName, asked_ns: u64) -> Result<Child> {
     let (robot, asked) = (robot.to_string(), asked_ns.to_string());
-    let child = process::child(robot_executable())
+    process::child(robot_executable())
         .arg0("firsthand")
         .args(["stop", "--robot", &robot, "--through-supervisor", &asked])
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
-        .spawn();
-    child.map_err(system("start a process that tells the supervisor"))
+        .spawn()
+        .map_err(system("start a process that tells the supervisor"))
 }
 
 fn told(mut teller: Child) -> Result {

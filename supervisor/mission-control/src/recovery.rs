@@ -97,9 +97,9 @@ impl RecoveredRun {
         if simulated && !file::exists(&run::checkpoint_file(directory, SIMULATOR)) {
             return Err(ResumeError::NoRobot { directory: named() });
         }
-        let newest = saved_state(directory)?.and_then(|state| state.newest());
-        let (first_tick, saved) =
-            newest.map_or((0, MissionTime::default()), |(tick, time)| (tick + 1, time));
+        let (first_tick, saved) = saved_state(directory)?
+            .and_then(|state| state.newest())
+            .map_or((0, MissionTime::default()), |(tick, time)| (tick + 1, time));
         // After a restart of the machine its clock says nothing.
         let latest = MissionTime(saved.0 + COMES_TO_REST.as_nanos() as u64);
         let time = match run.clock {

@@ -194,6 +194,6 @@ pub fn simulate(
     surroundings: &mut dyn Surroundings,
     listener: Listener,
 ) -> Result<Finished> {
-    let conducted = conduct(options, surroundings, &Turns::default(), listener, &mut |_| {});
-    conducted.map(|(finished, _)| finished)
+    conduct(options, surroundings, &Turns::default(), listener, &mut |_| {})
+        .map(|(finished, _)| finished)
 }

@@ -77,8 +77,11 @@ impl RunClock {
         }
         let pose_at = |tick| record.pose_at(tick).map(|pose| pose.stamp.time());
         // The first command follows from tick 0.
-        let first = record.poses.first().filter(|pose| pose.stamp.tick == 0);
-        let first = first.map_or(MissionTime::default(), |pose| pose.stamp.time());
+        let first = record
+            .poses
+            .first()
+            .filter(|pose| pose.stamp.tick == 0)
+            .map_or(MissionTime::default(), |pose| pose.stamp.time());
         let last = last_tick.or(record.newest_tick()).and_then(pose_at);
         last.map_or(0.0, |last| last.since(first).as_secs_f64())
     }

@@ -78,8 +78,7 @@ impl Simulator {
         let file = directory.join("mission.toml");
         fs::write(&file, text).map_err(system(format!("write {} for", file.display())))?;
         let log_path = directory.join("x80-sim.log");
-        let log = append(&log_path);
-        let log = log.map_err(system(format!("write {} for", log_path.display())))?;
+        let log = append(&log_path).map_err(system(format!("write {} for", log_path.display())))?;
         let checkpoint = run::checkpoint_file(directory, "x80-sim");
         let mission = file.to_str().ok_or_else(|| {
             SimulatorError::Startup("the run directory's name is not UTF-8".into())

@@ -115,16 +115,15 @@ impl<'a> Supervisor<'a> {
             }
             None => RunClock::begin(options.pace, &mission.robot, robot.simulator.is_some()),
         };
-        let run = Run {
+        Run {
             robot: options.robot.clone(),
             address: robot.address.clone(),
             clock: clock.clock,
             mission: mission.clone(),
-        };
-        run.save(directory)?;
+        }
+        .save(directory)?;
         let unchecked = clock.in_ticks().then(|| clock.first_tick(None));
-        let targets = state.targets.take();
-        let mut targets = targets.unwrap_or_else(|| TargetList::of(mission));
+        let mut targets = state.targets.take().unwrap_or_else(|| TargetList::of(mission));
         // A hand-driven robot needs a new request.
         targets.release();
         state.following.iter_mut().for_each(|following| following.is_lost = true);
@@ -448,8 +447,10 @@ impl<'a> Supervisor<'a> {
         let mut descriptors = self.stages.descriptors();
         descriptors.extend(self.robot.simulator.as_ref().and_then(|it| it.descriptor()));
         let hand = self.hand_until.map(|until| until.saturating_duration_since(Instant::now()));
-        let deadlines = [self.stages.time_to_deadline(), self.service.time_to_feed(), hand];
-        let soonest = deadlines.into_iter().flatten().min();
+        let soonest = [self.stages.time_to_deadline(), self.service.time_to_feed(), hand]
+            .into_iter()
+            .flatten()
+            .min();
         let timeout = soonest.map_or(topics::RESTATE, |soonest| soonest.min(topics::RESTATE));
         self.bus.waiter.wait_also_for(&descriptors, timeout)?;
         self.stages.on_waited(timeout);

@@ -147,8 +147,8 @@ impl TargetList {
     pub(crate) fn outcome_while_waiting(&self) -> Option<Outcome> {
         let tried = |it: &&Stored| it.result.outcome != TargetOutcome::NotTried;
         // A hand's target is the current one and has no result.
-        let newest = self.results.iter().rfind(tried).filter(|_| !self.by_hand);
-        let newest = newest.map(|it| it.result.outcome);
+        let newest =
+            self.results.iter().rfind(tried).filter(|_| !self.by_hand).map(|it| it.result.outcome);
         (self.waits || self.by_hand).then_some(match newest {
             Some(TargetOutcome::Unreachable) => Outcome::Unreachable,
             Some(TargetOutcome::TimedOut) => Outcome::Timeout,
@@ -364,13 +364,16 @@ pub(crate) fn of_all(ending: Ending, results: &[TargetResult]) -> Ending {
         ),
         (TargetOutcome::ReachedUnsure, Outcome::ReachedUnsure, "was unsure"),
     ];
-    let first = worse.into_iter().find_map(|(of_target, outcome, words)| {
-        let is_so = |it: &&TargetResult| it.outcome == of_target && it.distance_m.is_some();
-        let result = results.iter().find(is_so)?;
-        let reason = format!("{}; the arrival at target {} {words}", ending.reason, result.number);
-        Some(Ending::failed(outcome, reason))
-    });
-    first.unwrap_or(ending)
+    worse
+        .into_iter()
+        .find_map(|(of_target, outcome, words)| {
+            let is_so = |it: &&TargetResult| it.outcome == of_target && it.distance_m.is_some();
+            let result = results.iter().find(is_so)?;
+            let reason =
+                format!("{}; the arrival at target {} {words}", ending.reason, result.number);
+            Some(Ending::failed(outcome, reason))
+        })
+        .unwrap_or(ending)
 }
 
 pub(crate) const fn held_refusal(reason: HoldReason) -> Option<RequestAnswer> {

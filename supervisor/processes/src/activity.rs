@@ -48,9 +48,12 @@ impl Times {
     /// Returns the times of process `pid`; `None` if it has ended or is not counted.
     pub(crate) fn of(pid: u32) -> Option<Self> {
         let [ran, _] = scheduled(&pid.to_string())?;
-        let threads = fs::read_dir(format!("/proc/{pid}/task")).ok()?.flatten();
-        let paths = threads.map(|it| format!("{pid}/task/{}", it.file_name().display()));
-        let starved = paths.filter_map(|path| Some(scheduled(&path)?[1])).sum();
+        let starved = fs::read_dir(format!("/proc/{pid}/task"))
+            .ok()?
+            .flatten()
+            .map(|it| format!("{pid}/task/{}", it.file_name().display()))
+            .filter_map(|path| Some(scheduled(&path)?[1]))
+            .sum();
         Some(Self { ran, starved })
     }
 

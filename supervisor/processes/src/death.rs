@@ -97,11 +97,12 @@ fn nanoseconds(seconds: f64) -> u64 {
 /// In whole lines; empty without a log.
 pub fn log_tail(log: &Path, since: u64) -> String {
     let mut bytes = [0; LOG_TAIL_BYTES];
-    let read = File::open(log).and_then(|log| {
-        let end = log.metadata()?.len();
-        log.read_at(&mut bytes, end.saturating_sub(LOG_TAIL_BYTES as u64).max(since))
-    });
-    let length = read.unwrap_or_default();
+    let length = File::open(log)
+        .and_then(|log| {
+            let end = log.metadata()?.len();
+            log.read_at(&mut bytes, end.saturating_sub(LOG_TAIL_BYTES as u64).max(since))
+        })
+        .unwrap_or_default();
     let text = String::from_utf8_lossy(&bytes[..length]);
     // The first line may be incomplete.
     let whole = match text.split_once('\n') {

@@ -28,7 +28,10 @@ pub(crate) fn raise_limit() -> Result<(), DomainError> {
 /// Returns the soft and hard limits from /proc; a service may lack the system call.
 fn limits() -> Option<[u64; 2]> {
     let limits = fs::read_to_string("/proc/self/limits").ok()?;
-    let line = limits.lines().find_map(|line| line.strip_prefix("Max open files"))?;
-    let mut numbers = line.split_ascii_whitespace().map(str::parse);
+    let mut numbers = limits
+        .lines()
+        .find_map(|line| line.strip_prefix("Max open files"))?
+        .split_ascii_whitespace()
+        .map(str::parse);
     Some([numbers.next()?.ok()?, numbers.next()?.ok()?])
 }

@@ -355,10 +355,11 @@ pub fn check_machine(
 /// Checks for space: writing to a segment in a full file system raises SIGBUS.
 fn check_shared_memory(mount: &str, cells: usize) -> Result<(), DomainError> {
     let needed = SMALL_TOPICS_BYTES + CELL_BYTES * cells as u64;
-    let space = access(mount, Access::WRITE_OK).and_then(|()| statvfs(mount));
-    let space = space.map_err(|error| DomainError::SharedMemory {
-        problem: format!("cannot be used: {error}"),
-        remedy: "mount a tmpfs there that all users may write",
+    let space = access(mount, Access::WRITE_OK).and_then(|()| statvfs(mount)).map_err(|error| {
+        DomainError::SharedMemory {
+            problem: format!("cannot be used: {error}"),
+            remedy: "mount a tmpfs there that all users may write",
+        }
     })?;
     let free = space.f_bavail * space.f_frsize;
     if free < needed {

@@ -131,8 +131,7 @@ impl Process {
 
     /// Watches the external process `id`, called `name`, which has just published.
     pub fn adopt(id: u32, name: &str) -> io::Result<Self> {
-        let pid = i32::try_from(id).ok().and_then(Pid::from_raw);
-        let pid = pid.ok_or(io::ErrorKind::NotFound)?;
+        let pid = i32::try_from(id).ok().and_then(Pid::from_raw).ok_or(io::ErrorKind::NotFound)?;
         let pidfd = pidfd_open(pid, PidfdFlags::empty())?;
         // The id may belong to another process by now.
         let called = fs::read_to_string(format!("/proc/{id}/comm"))?;
@@ -160,8 +159,7 @@ impl Process {
 
     pub fn try_reap(&mut self) -> io::Result<Option<ExitCause>> {
         let Some(child) = &mut self.child else {
-            let gone = self.wait(Duration::ZERO)?;
-            return Ok(gone.then_some(ExitCause::Unknown));
+            return Ok(self.wait(Duration::ZERO)?.then_some(ExitCause::Unknown));
         };
         Ok(child.try_wait()?.map(ExitCause::from))
     }

@@ -91,13 +91,20 @@ impl StageProcesses {
     }
 
     pub fn descriptors(&self) -> Vec<BorrowedFd<'_>> {
-        let processes = self.stages.iter().filter_map(|stage| stage.process.as_ref());
-        processes.filter_map(|process| process.descriptor()).collect()
+        self.stages
+            .iter()
+            .filter_map(|stage| stage.process.as_ref())
+            .filter_map(|process| process.descriptor())
+            .collect()
     }
 
     pub fn time_to_deadline(&self) -> Option<Duration> {
-        let deadline = self.stages.iter().filter_map(|stage| stage.policy.deadline()).min();
-        let left = deadline?.saturating_sub(self.now());
+        let left = self
+            .stages
+            .iter()
+            .filter_map(|stage| stage.policy.deadline())
+            .min()?
+            .saturating_sub(self.now());
         Some(if left.is_zero() { LOOK_AGAIN } else { left })
     }
 
@@ -131,10 +138,11 @@ impl StageProcesses {
             return;
         }
         let now = self.now();
-        let stages = &self.stages;
         let unstarved = |stage: &str| {
-            let stage = stages.iter().find(|it| it.stage.name == stage);
-            stage.map_or(now, StageProcess::unstarved)
+            self.stages
+                .iter()
+                .find(|it| it.stage.name == stage)
+                .map_or(now, StageProcess::unstarved)
         };
         if let Some(stage) = self.watchdog.stale(unstarved) {
             tracing::warn!(stage, "the stage sends heartbeats but does not answer its inputs");
@@ -277,8 +285,7 @@ impl StageProcesses {
     }
 
     fn names(&self, of: impl Fn(&StageProcess) -> bool) -> Vec<&'static str> {
-        let stages = self.stages.iter().filter(|stage| of(stage));
-        stages.map(|stage| stage.stage.name).collect()
+        self.stages.iter().filter(|stage| of(stage)).map(|stage| stage.stage.name).collect()
     }
 
     pub fn restarts(&self) -> impl Iterator<Item = (&'static str, u32)> + '_ {

@@ -63,8 +63,7 @@ impl Stage {
 
     /// `None` for `firsthand`'s own.
     pub fn executable<'mission>(&self, mission: &'mission Mission) -> Option<&'mission Path> {
-        let named = mission.planner.executable.as_deref();
-        named.filter(|_| self.name == PLANNER)
+        mission.planner.executable.as_deref().filter(|_| self.name == PLANNER)
     }
 
     pub fn deadlines_on(&self, cells: usize) -> Deadlines {
