@@ -202,8 +202,7 @@ impl Output {
             return Ok(());
         };
         let header = MessageHeader { channel_id, sequence, log_time, publish_time };
-        let written = self.writer.write_to_known_channel(&header, message);
-        written.map_err(failed(&self.path))
+        self.writer.write_to_known_channel(&header, message).map_err(failed(&self.path))
     }
 
     pub(crate) fn metadata(&mut self, name: &str, metadata: BTreeMap<String, String>) -> Result {

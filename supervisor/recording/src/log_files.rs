@@ -63,9 +63,13 @@ impl LogFiles {
     }
 
     fn files(&self) -> Vec<PathBuf> {
-        let entries = fs::read_dir(&self.directory).into_iter().flatten().flatten();
-        let files = entries.map(|entry| entry.path());
-        files.filter(|file| file.extension().is_some_and(|extension| extension == "log")).collect()
+        fs::read_dir(&self.directory)
+            .into_iter()
+            .flatten()
+            .flatten()
+            .map(|entry| entry.path())
+            .filter(|file| file.extension().is_some_and(|extension| extension == "log"))
+            .collect()
     }
 
     /// Returns process and text of every new line. An unreadable log is retried later.

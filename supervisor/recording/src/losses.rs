@@ -41,8 +41,10 @@ impl Losses {
             return true;
         }
         const { assert!(STAMP.end - STAMP.start == size_of::<Stamp>()) };
-        let stage = message.get(STAMP.end..).and_then(|rest| rest.first_chunk());
-        let stage = stage.filter(|_| spec.writer == EVERY_STAGE);
+        let stage = message
+            .get(STAMP.end..)
+            .and_then(|rest| rest.first_chunk())
+            .filter(|_| spec.writer == EVERY_STAGE);
         let key = (spec.name, stage.copied().unwrap_or_default(), stamp.generation);
         let now = Last { sequence: stamp.sequence, crc32: crc32fast::hash(message), bus: self.bus };
         let last = self.last.insert(key, now);

@@ -19,13 +19,21 @@ pub(crate) fn numbered(out: &Path, number: u32) -> PathBuf {
 /// another.
 fn taken(run: &Path) -> BTreeMap<u32, PathBuf> {
     let first = run.join("recording.mcap");
-    let paths = fs::read_dir(run).into_iter().flatten().flatten().map(|entry| entry.path());
-    let with_numbers = paths.filter_map(|path| {
-        let name = path.file_stem()?.to_str()?.rsplit_once('-');
-        let number = name.map_or(Ok(1), |(_, number)| number.parse()).ok()?;
-        (path == numbered(&first, number)).then_some((number, path))
-    });
-    with_numbers.collect()
+    fs::read_dir(run)
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|entry| entry.path())
+        .filter_map(|path| {
+            let number = path
+                .file_stem()?
+                .to_str()?
+                .rsplit_once('-')
+                .map_or(Ok(1), |(_, number)| number.parse())
+                .ok()?;
+            (path == numbered(&first, number)).then_some((number, path))
+        })
+        .collect()
 }
 
 pub fn next_place(run: &Path) -> PathBuf {

@@ -192,8 +192,7 @@ impl Recording {
         mut decode: D,
     ) -> Result<impl Iterator<Item = Result<S>> + use<S, D>> {
         let file = self.path.clone();
-        let messages = self.messages(wanted)?;
-        Ok(messages.map(move |message| {
+        Ok(self.messages(wanted)?.map(move |message| {
             let message = message?;
             let topic = Arc::clone(&message.topic);
             decode(message).ok_or_else(|| RecordingError::Message {
@@ -238,8 +237,7 @@ impl Records {
     }
 
     fn topic(&self, header: &MessageHeader) -> Result<Arc<str>> {
-        let known = self.channels.get(&header.channel_id).cloned();
-        known.ok_or_else(|| RecordingError::Foreign {
+        self.channels.get(&header.channel_id).cloned().ok_or_else(|| RecordingError::Foreign {
             file: self.path.clone(),
             problem: format!("channel {} is not declared", header.channel_id),
         })
@@ -276,8 +274,9 @@ impl Records {
                             read => break read,
                         }
                     };
-                    let read = read.map_err(FileError::of("read recording", &self.path));
-                    let read = read.map_err(|error| Stop::Error(error.into()))?;
+                    let read = read
+                        .map_err(FileError::of("read recording", &self.path))
+                        .map_err(|error| Stop::Error(error.into()))?;
                     self.reader.notify_read(read);
                 }
                 LinearReadEvent::Record { data, opcode } => {

@@ -322,8 +322,8 @@ impl CurrentRun {
 
     /// Continues in another, self-contained file. Returns the completed file.
     fn go_on_in(&mut self, path: &Path, topics: &[&'static dyn AnyTopic]) -> Result<PathBuf> {
-        let next = RecordingFile::create(path, topics, self.run.as_ref(), self.about.clone())?;
-        let next = next.continuing(&self.file);
+        let next = RecordingFile::create(path, topics, self.run.as_ref(), self.about.clone())?
+            .continuing(&self.file);
         std::mem::replace(&mut self.file, next).finish()?;
         self.file.lost(self.losses.counts())?;
         self.began = Instant::now();

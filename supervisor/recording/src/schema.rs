@@ -20,8 +20,11 @@ pub struct Schema {
 
 /// All schemas by name, without comments.
 static OWN: LazyLock<BTreeMap<String, String>> = LazyLock::new(|| {
-    let schemas = topics::TABLE.iter().map(|topic| of(*topic));
-    schemas.map(|Schema { name, text }| (name, uncommented(&text))).collect()
+    topics::TABLE
+        .iter()
+        .map(|topic| of(*topic))
+        .map(|Schema { name, text }| (name, uncommented(&text)))
+        .collect()
 });
 
 /// Returns whether a recorded schema has the name of a known one and other fields.
@@ -68,8 +71,11 @@ pub fn of(topic: &dyn AnyTopic) -> Schema {
 }
 
 fn fields(structure: &Structure, parts: &mut Vec<Structure>) -> String {
-    let fields = structure.fields.iter();
-    fields.map(|field| format!("{} {}\n", kind(&field.kind, parts), field.name)).collect()
+    structure
+        .fields
+        .iter()
+        .map(|field| format!("{} {}\n", kind(&field.kind, parts), field.name))
+        .collect()
 }
 
 fn kind(of: &Kind, parts: &mut Vec<Structure>) -> String {

@@ -254,8 +254,7 @@ fn grid(frame: GridFrame, cells: &[u8], time: &Message) -> Message {
     let mut data = Vec::with_capacity(drawn * drawn * CELL.len());
     for row in 0..drawn {
         for col in 0..drawn {
-            let rows = (row * each..side).take(each);
-            let inside = rows.flat_map(|row| {
+            let inside = (row * each..side).take(each).flat_map(|row| {
                 &cells[row * side..][..side][col * each..][..each.min(side - col * each)]
             });
             // A drawn cell is hazard if any of its cells is.
@@ -343,10 +342,10 @@ const LOG_NAME: u64 = 4;
 /// they are errors.
 fn level(line: &str) -> u64 {
     let levels = ["DEBUG", "INFO", "WARN", "ERROR"];
-    let named = (1..)
+    (1..)
         .zip(levels)
-        .find(|(_, level)| line.split_whitespace().take(3).any(|word| word == *level));
-    named.map_or(4, |(number, _)| number)
+        .find(|(_, level)| line.split_whitespace().take(3).any(|word| word == *level))
+        .map_or(4, |(number, _)| number)
 }
 
 /// Returns process and text of a `log` message, JSON in older recordings.

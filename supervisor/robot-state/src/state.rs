@@ -123,8 +123,11 @@ impl RobotState {
     }
 
     pub fn processes(&self) -> Vec<u32> {
-        let stages = self.stages.iter().map(|entry| entry.pid);
-        stages.chain([self.supervisor.unwrap_or_default().supervisor_pid]).collect()
+        self.stages
+            .iter()
+            .map(|entry| entry.pid)
+            .chain([self.supervisor.unwrap_or_default().supervisor_pid])
+            .collect()
     }
 
     pub fn take_events(&mut self) -> Vec<Event> {

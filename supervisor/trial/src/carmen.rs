@@ -63,8 +63,11 @@ impl Reading {
             }
             Some("FLASER") => {
                 let beams = words.next()?.parse().ok().filter(|it| *it <= MOST_BEAMS)?;
-                let beams = words.by_ref().take(beams).map(|word| word.parse().ok());
-                let beams = beams.collect::<Option<Vec<f32>>>()?;
+                let beams = words
+                    .by_ref()
+                    .take(beams)
+                    .map(|word| word.parse().ok())
+                    .collect::<Option<Vec<f32>>>()?;
                 let [x, y, heading, robot_x, robot_y, robot_heading, time_s] = numbers(&mut words)?;
                 if self.last.is_none() {
                     self.odometry(pose([robot_x, robot_y, robot_heading]), time_s);

@@ -228,8 +228,10 @@ impl Driver<'_> {
                     let stands =
                         decision.action >= Action::Stop && !PAUSES.contains(&decision.cause);
                     if stands && decision.cause != before.cause {
-                        let words = self.link.explain(decision.cause, self.now_ns);
-                        let why = words.unwrap_or_else(|| decision.cause.name().to_owned());
+                        let why = self
+                            .link
+                            .explain(decision.cause, self.now_ns)
+                            .unwrap_or_else(|| decision.cause.name().to_owned());
                         let time_s = (self.now_ns - BEGINS_NS) as f64 * 1e-9;
                         self.stands.push((time_s, why));
                         self.resume();

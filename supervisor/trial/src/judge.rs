@@ -40,8 +40,7 @@ pub fn judge(log: &Log, drive: &Drive) -> Judged {
     let references = drive.references.as_deref();
     let error = |poses: &[Pose2], way_m| error_over(references?, poses, way_m);
     let beyond = references.map(|references| {
-        let pairs = references.iter().zip(&drive.poses);
-        let beyond = pairs.filter(|(truth, pose)| {
+        let beyond = references.iter().zip(&drive.poses).filter(|(truth, pose)| {
             let DVec2 { x, y } = pose.pose().position - truth.position;
             let [xx, xy, _, yy, ..] = pose.covariance;
             let squared = x * x * yy - 2.0 * x * y * xy + y * y * xx;

@@ -58,8 +58,11 @@ impl Log {
     /// Returns an error if the file cannot be read, is no log, or holds no scans.
     pub fn read(file: &Path) -> Result<Self, LogError> {
         let mut log = carmen::read(file)?;
-        let first = log.instants.iter().position(|it| it.scan.is_some());
-        let first = first.ok_or_else(|| LogError::Empty { file: file.to_owned() })?;
+        let first = log
+            .instants
+            .iter()
+            .position(|it| it.scan.is_some())
+            .ok_or_else(|| LogError::Empty { file: file.to_owned() })?;
         log.instants.drain(..first);
         Ok(log)
     }

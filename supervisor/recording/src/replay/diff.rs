@@ -45,8 +45,11 @@ fn run_differences(first: &str, second: &str) -> Vec<String> {
     let (first, second): (Vec<_>, Vec<_>) =
         (first.lines().filter(own).collect(), second.lines().filter(own).collect());
     let only = |mark: &'static str, lines: &[&str], others: &[&str]| -> Vec<String> {
-        let lines = lines.iter().filter(|line| !others.contains(line));
-        lines.map(|line| format!("{mark} {line}")).collect()
+        lines
+            .iter()
+            .filter(|line| !others.contains(line))
+            .map(|line| format!("{mark} {line}"))
+            .collect()
     };
     let mut lines = only("-", &first, &second);
     lines.extend(only("+", &second, &first));

@@ -151,8 +151,11 @@ impl<'a> Generation<'a> {
     pub(crate) fn output(&mut self, topic: &str, sequence: u32, message: Vec<u8>) {
         self.worked = true;
         if !self.is_over() {
-            let channel = self.channels.entry(topic.to_owned()).or_default();
-            channel.recorded.push_back((sequence, message));
+            self.channels
+                .entry(topic.to_owned())
+                .or_default()
+                .recorded
+                .push_back((sequence, message));
             self.compare(topic);
         }
     }
@@ -182,12 +185,11 @@ impl<'a> Generation<'a> {
 
     fn differs(&mut self, topic: &str, recorded: &[u8], computed: &Computed) {
         let tick = tick_of(recorded);
-        let found = topics::find(topic)
-            .and_then(|topic| values::first_difference(topic, [recorded, &computed.message], &[]));
-        let (field, [was, is]) = found.unwrap_or_default();
+        let (field, [was, is]) = topics::find(topic)
+            .and_then(|topic| values::first_difference(topic, [recorded, &computed.message], &[]))
+            .unwrap_or_default();
         let describe = |body: &Body| {
-            let said = self.replay.as_ref()?.describe(body).ok()?;
-            Some(said.chars().take(SHOWN_LENGTH).collect())
+            Some(self.replay.as_ref()?.describe(body).ok()?.chars().take(SHOWN_LENGTH).collect())
         };
         self.difference = Some(Difference {
             stage: self.stage.name,

@@ -44,8 +44,7 @@ impl Report {
     }
 
     pub fn not_replayed(&self) -> usize {
-        let stages = self.stages.values();
-        stages.map(|stage| stage.not_replayed.len()).sum()
+        self.stages.values().map(|stage| stage.not_replayed.len()).sum()
     }
 
     /// Stores `difference` if its tick precedes the stored one's.

@@ -117,8 +117,10 @@ fn number(bytes: &mut impl Iterator<Item = io::Result<u8>>) -> Result<u32, Cause
         };
         match (byte, number) {
             (b'0'..=b'9', _) => {
-                let grown = number.unwrap_or(0).checked_mul(10);
-                let grown = grown.and_then(|tens| tens.checked_add((byte - b'0').into()));
+                let grown = number
+                    .unwrap_or(0)
+                    .checked_mul(10)
+                    .and_then(|tens| tens.checked_add((byte - b'0').into()));
                 number = Some(grown.ok_or("a number is too large")?);
             }
             (b'#', None) => while !matches!(bytes.next().transpose()?, Some(b'\n') | None) {},

@@ -44,12 +44,16 @@ impl Map {
 
     /// Returns column and row, or `None` if no cell is free.
     pub fn nearest_free(&self, col: usize, row: usize) -> Option<(usize, usize)> {
-        let free = self.blocked.iter().enumerate().filter(|cell| !cell.1);
-        free.map(|(at, _)| (at % self.cols, at / self.cols)).min_by_key(|cell| {
-            let (x, y) = (cell.0.abs_diff(col) as u64, cell.1.abs_diff(row) as u64);
-            // Saturates, because distances far outside the map may overflow.
-            x.saturating_mul(x).saturating_add(y.saturating_mul(y))
-        })
+        self.blocked
+            .iter()
+            .enumerate()
+            .filter(|cell| !cell.1)
+            .map(|(at, _)| (at % self.cols, at / self.cols))
+            .min_by_key(|cell| {
+                let (x, y) = (cell.0.abs_diff(col) as u64, cell.1.abs_diff(row) as u64);
+                // Saturates, because distances far outside the map may overflow.
+                x.saturating_mul(x).saturating_add(y.saturating_mul(y))
+            })
     }
 }
 
@@ -70,8 +74,11 @@ impl PlacedMap {
                 return None;
             }
             let (col, row) = (first % cols, first / cols);
-            let run = (first..(row + 1) * cols).take_while(|&cell| solid[cell]);
-            let width = run.filter(|&cell| wanted[cell]).last().map_or(1, |last| last - first + 1);
+            let width = (first..(row + 1) * cols)
+                .take_while(|&cell| solid[cell])
+                .filter(|&cell| wanted[cell])
+                .last()
+                .map_or(1, |last| last - first + 1);
             let line = |row: usize| row * cols + col..row * cols + col + width;
             let covers = |row: &usize| {
                 line(*row).all(|cell| solid[cell]) && line(*row).any(|cell| wanted[cell])

@@ -81,8 +81,11 @@ pub fn save_believed(
         }
     };
     // Row 0 is the lowest of the grid and the highest of an image.
-    let places = (0..side).rev().flat_map(|row| (0..side).map(move |col| (col, row)));
-    let pixels: Vec<u8> = places.map(|(col, row)| pixel(col, row)).collect();
+    let pixels: Vec<u8> = (0..side)
+        .rev()
+        .flat_map(|row| (0..side).map(move |col| (col, row)))
+        .map(|(col, row)| pixel(col, row))
+        .collect();
     let corner_m = frame.corner().to_array();
     ros::save(file, frame.cells as usize, &pixels, frame.resolution_m, corner_m)
 }

@@ -195,8 +195,8 @@ impl Collector {
             truth[2],
         ];
         assert_eq!(values.len(), COLUMNS.len());
-        let ranges = self.newest.ranges.iter().flatten();
-        let ranges = ranges.map(|range| range.map_or(Value::Null, rounded));
+        let ranges =
+            self.newest.ranges.iter().flatten().map(|range| range.map_or(Value::Null, rounded));
         let movers = self.newest.movers.as_ref().filter(|movers| !movers.is_empty());
         let movers = movers.map(|movers| movers.iter().map(mover).collect::<Value>());
         Some(values.into_iter().map(rounded).chain(ranges).chain(movers).collect())
@@ -318,8 +318,10 @@ impl Collector {
 /// Formats place, velocity, radius and the surface's 95 % radius, rounded to save space.
 fn mover(mover: &Mover) -> Value {
     let (at, velocity) = (mover.place(), mover.velocity());
-    let values = [at.x, at.y, velocity.x, velocity.y, mover.radius_m.into(), mover.reach_m()];
-    values.into_iter().map(|value| Value::from((value * 1e2).round() / 1e2)).collect()
+    [at.x, at.y, velocity.x, velocity.y, mover.radius_m.into(), mover.reach_m()]
+        .into_iter()
+        .map(|value| Value::from((value * 1e2).round() / 1e2))
+        .collect()
 }
 
 /// Rounds to a tenth of a millimetre. Non-finite values become null.

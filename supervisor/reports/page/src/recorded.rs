@@ -79,8 +79,10 @@ fn script(kind: &str, file: &str) -> String {
 }
 
 fn asset(file: &str) -> &'static str {
-    let found = assets::ALL.iter().find(|(path, ..)| path.strip_prefix('/') == Some(file));
-    found.map_or("", |(_, _, text)| text)
+    assets::ALL
+        .iter()
+        .find(|(path, ..)| path.strip_prefix('/') == Some(file))
+        .map_or("", |(_, _, text)| text)
 }
 
 /// Bundles the modules in one script, each in its own scope.

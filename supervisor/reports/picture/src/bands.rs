@@ -56,8 +56,8 @@ impl Levels {
         let from = (along as usize).min(self.ramp.len() - 2);
         let part = along - from as f64;
         let [a, b] = [from, from + 1].map(|at| DVec3::from_array(self.ramp[at]));
-        let channels = (a + (b - a) * part).round().to_array();
-        let [red, green, blue] = channels.map(|channel| channel as u8);
+        let [red, green, blue] =
+            (a + (b - a) * part).round().to_array().map(|channel| channel as u8);
         format!("#{red:02x}{green:02x}{blue:02x}")
     }
 }
@@ -221,8 +221,8 @@ impl Samples {
     fn passages(&self, col: usize, row: usize, level: f64) -> impl Iterator<Item = (usize, usize)> {
         let at = row * self.across + col;
         // Counter-clockwise, each with the crossing on the way to the next.
-        let corners = [at, at + 1, at + self.across + 1, at + self.across];
-        let inside = corners.map(|corner| self.values[corner] >= level);
+        let inside = [at, at + 1, at + self.across + 1, at + self.across]
+            .map(|corner| self.values[corner] >= level);
         let crossings = [2 * at, 2 * (at + 1) + 1, 2 * (at + self.across), 2 * at + 1];
         // A passage has the area on its left: from where the way leaves it to where it last entered.
         let leaves = (0..4).filter(move |&corner| inside[corner] && !inside[(corner + 1) % 4]);

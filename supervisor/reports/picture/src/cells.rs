@@ -36,8 +36,7 @@ impl BelievedHazard {
     }
 
     pub(super) fn layer(&self) -> String {
-        let areas = self.0.iter();
-        areas.map(|(colour, _, area)| area.element(&format!("fill=\"{colour}\""))).collect()
+        self.0.iter().map(|(colour, _, area)| area.element(&format!("fill=\"{colour}\""))).collect()
     }
 }
 
@@ -63,8 +62,11 @@ fn coarsened(lattice: &Lattice, cells: &[u8], block: usize) -> Vec<CellState> {
     }
     let kinds = [CellState::Sensed, CellState::Known, CellState::Perimeter];
     let most = |count: &[u32; 6]| {
-        let found = kinds.into_iter().filter(|kind| count[*kind as usize] > 0);
-        found.max_by_key(|kind| count[*kind as usize]).unwrap_or(CellState::Free)
+        kinds
+            .into_iter()
+            .filter(|kind| count[*kind as usize] > 0)
+            .max_by_key(|kind| count[*kind as usize])
+            .unwrap_or(CellState::Free)
     };
     tally.iter().map(most).collect()
 }

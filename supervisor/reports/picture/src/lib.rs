@@ -93,15 +93,17 @@ pub fn svg(scene: &Scene<'_>) -> String {
         movers: &movers,
     };
 
-    let layers = [
+    let drawn: String = [
         bands.as_ref().map(Bands::layer),
         lines,
         hazard.as_ref().map(BelievedHazard::layer),
         Some(world::layer(&view, &scene.mission.world)),
         Some(motion.layer(&view)),
         Some(movers.layer(&view)),
-    ];
-    let drawn: String = layers.into_iter().flatten().collect();
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
     let plot = format!(
         "<g clip-path=\"url(#plot)\">\n\
          <rect x=\"{PLOT_LEFT}\" y=\"{PLOT_TOP}\" width=\"{PLOT_SIDE}\" height=\"{PLOT_SIDE}\" fill=\"{}\"/>\n\

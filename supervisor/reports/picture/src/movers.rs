@@ -63,8 +63,11 @@ impl<'a> Movers<'a> {
 }
 
 fn lasts_s(trail: &Trail<'_>) -> f64 {
-    let ends = trail.places.first().zip(trail.places.last());
-    ends.map_or(0.0, |((from_s, _), (until_s, _))| until_s - from_s)
+    trail
+        .places
+        .first()
+        .zip(trail.places.last())
+        .map_or(0.0, |((from_s, _), (until_s, _))| until_s - from_s)
 }
 
 fn place_at(places: &[(f64, DVec2)], at_s: f64) -> Option<DVec2> {

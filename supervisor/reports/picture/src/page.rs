@@ -72,8 +72,7 @@ impl View {
 
     pub(super) fn shows(&self, centre: DVec2, radius_m: f64) -> bool {
         let reach = radius_m + self.side_m / 2.0;
-        let from_middle = (centre - self.low - DVec2::splat(self.side_m / 2.0)).abs();
-        from_middle.cmple(DVec2::splat(reach)).all()
+        (centre - self.low - DVec2::splat(self.side_m / 2.0)).abs().cmple(DVec2::splat(reach)).all()
     }
 
     /// Draws a line in metres, cut at the plot and broken at non-finite points.

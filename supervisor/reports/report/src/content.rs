@@ -89,8 +89,7 @@ impl Content {
 
     fn part(&mut self, recording: &Recording) -> Result<(), RecordingError> {
         self.remarks.extend(recording.gaps());
-        let topics = TOPICS.iter().map(|topic| topic.spec().name);
-        let wanted: Vec<_> = topics.chain([LOG]).collect();
+        let wanted: Vec<_> = TOPICS.iter().map(|topic| topic.spec().name).chain([LOG]).collect();
         recording.decoded(&wanted, |message| self.take(&message))?.collect()
     }
 
@@ -182,8 +181,14 @@ impl Content {
             }
         }
         let about = self.about.iter().map(|(name, value)| json!([name, value, ""]));
-        let targets = self.summary.get("targets").and_then(Value::as_array).into_iter().flatten();
-        let results: Vec<_> = targets.map(page::result).collect();
+        let results: Vec<_> = self
+            .summary
+            .get("targets")
+            .and_then(Value::as_array)
+            .into_iter()
+            .flatten()
+            .map(page::result)
+            .collect();
         self.page.text(&json!({
             "metrics": metrics::rows(&self).into_iter().chain(about).collect::<Vec<_>>(),
             "results": results,

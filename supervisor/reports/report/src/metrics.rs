@@ -37,9 +37,12 @@ pub(crate) fn rows(content: &Content) -> Vec<Value> {
     let ratio = path.zip(straight).map(|(path, straight)| path / straight);
     let latency = content.heard.latency();
     let quantile = |field: &str, share: f64| {
-        let summed = content.summary.get("tick_latency_us");
-        let summed = summed.and_then(|tick| tick.get(field)?.as_f64());
-        summed.or_else(|| latency.quantile_us(share)).map(|us| us / 1e3)
+        content
+            .summary
+            .get("tick_latency_us")
+            .and_then(|tick| tick.get(field)?.as_f64())
+            .or_else(|| latency.quantile_us(share))
+            .map(|us| us / 1e3)
     };
     let success = match content.outcome() {
         Some(reached) if reached.starts_with("reached") => format!("1 ({reached})"),
@@ -113,8 +116,7 @@ fn wheel_range(content: &Content) -> Option<f64> {
     if content.mission.body().steering.is_some() {
         return None;
     }
-    let summed = content.summed("wheel_range_rad_s");
-    summed.or_else(|| content.heard.wheel_range_rad_s(u64::MAX))
+    content.summed("wheel_range_rad_s").or_else(|| content.heard.wheel_range_rad_s(u64::MAX))
 }
 
 fn restarts(content: &Content) -> Option<f64> {

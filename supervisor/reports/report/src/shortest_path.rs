@@ -48,8 +48,10 @@ pub fn over_neighbours<C: Copy + Eq + Hash>(
         let [cols, rows] = apart(cell);
         cols.min(rows) * DIAGONAL + cols.abs_diff(rows) * STRAIGHT
     };
-    let steps = (-1..=1).flat_map(|rows| (-1..=1).map(move |cols| [cols, rows]));
-    let steps: Vec<_> = steps.filter(|step| *step != [0, 0]).collect();
+    let steps: Vec<_> = (-1..=1)
+        .flat_map(|rows| (-1..=1).map(move |cols| [cols, rows]))
+        .filter(|step| *step != [0, 0])
+        .collect();
     let neighbours = |&cell: &C| {
         let next = |&step: &[i32; 2]| {
             let length = if step.contains(&0) { STRAIGHT } else { DIAGONAL };

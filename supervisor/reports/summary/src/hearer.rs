@@ -113,8 +113,8 @@ impl Hearer {
         let Some(last) = last else {
             return self.solves.values().sum();
         };
-        let before = self.solves.range(..last.stamp.generation);
-        before.map(|(_, count)| count).sum::<u64>() + last.full_solves
+        self.solves.range(..last.stamp.generation).map(|(_, count)| count).sum::<u64>()
+            + last.full_solves
     }
 
     pub fn wheel_range_rad_s(&self, tick: u64) -> Option<f64> {

@@ -138,8 +138,7 @@ impl Summary {
             collisions: ended.map(|tick| tick.contacts),
             contact_speed_m_s: contact_speed_m_s(truth, mission.body().track_m),
             pose_error_m: pose.and_then(|pose| {
-                let its = truth.iter().rev().find(|tick| tick.is_of(pose));
-                Some(its.or(ended)?.pose_error_m(pose))
+                Some(truth.iter().rev().find(|tick| tick.is_of(pose)).or(ended)?.pose_error_m(pose))
             }),
             pose_error_expected_m: pose.map(PoseSample::position_rms_m),
             pose_within_m: pose.map(PoseSample::position_within_m),
@@ -207,8 +206,11 @@ impl Summary {
             .filter(|(_, times)| **times > 0)
             .map(|(stage, times)| format!("{stage} restarted {times}×"))
             .collect();
-        let resumed = (self.resumes > 0).then(|| format!("resumed {}×", self.resumes));
-        let all: Vec<_> = resumed.into_iter().chain(some).collect();
+        let all: Vec<_> = (self.resumes > 0)
+            .then(|| format!("resumed {}×", self.resumes))
+            .into_iter()
+            .chain(some)
+            .collect();
         if all.is_empty() { "no restarts".to_owned() } else { all.join(", ") }
     }
 }
@@ -251,12 +253,14 @@ pub fn departed_s(mission: &Mission, truth: &[GroundTruthTick]) -> Option<f64> {
 /// metres.
 fn straight_m(mission: &Mission, targets: &[TargetResult]) -> f64 {
     let mut here = mission.start.at.to_array();
-    let counted = targets.iter().filter(|target| target.outcome != TargetOutcome::Replaced);
-    let legs = counted.map(|target| {
-        let [x, y] = std::mem::replace(&mut here, [target.x_m, target.y_m]);
-        (target.x_m - x).hypot(target.y_m - y)
-    });
-    legs.sum()
+    targets
+        .iter()
+        .filter(|target| target.outcome != TargetOutcome::Replaced)
+        .map(|target| {
+            let [x, y] = std::mem::replace(&mut here, [target.x_m, target.y_m]);
+            (target.x_m - x).hypot(target.y_m - y)
+        })
+        .sum()
 }
 
 /// Uses square roots, identical on every processor, unlike the C library's `hypot`.

@@ -28,8 +28,11 @@ impl<T: Copy + Default> Totals<T> {
     }
 
     pub(crate) fn at(&self, tick: u64) -> T {
-        let until = self.newest.iter().rev().find(|(of, _)| *of <= tick);
-        until.map_or(T::default(), |&(_, totals)| totals)
+        self.newest
+            .iter()
+            .rev()
+            .find(|(of, _)| *of <= tick)
+            .map_or(T::default(), |&(_, totals)| totals)
     }
 }
 
