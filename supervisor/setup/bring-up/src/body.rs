@@ -43,18 +43,21 @@ pub(crate) fn motors(turns_back: bool, drives_back: bool, exchanged: bool) -> Ma
 
 /// Describes motor or encoder faults: one `part` for each row that differs from the identity.
 pub(crate) fn words(parts: Matrix2<f64>, part: &str) -> String {
-    let sides = ["left", "right"].into_iter().enumerate();
-    let wrong = sides.filter_map(|(row, side)| {
-        let what = match (parts[(row, row)], parts[(row, 1 - row)]) {
-            (1.0, _) => return None,
-            (0.0, 0.0) => "nothing",
-            (_, 0.0) => "backwards",
-            (_, 1.0) => "the other wheel",
-            _ => "the other wheel backwards",
-        };
-        Some(format!("the {side} {part} {what}"))
-    });
-    wrong.collect::<Vec<_>>().join(" and ")
+    ["left", "right"]
+        .into_iter()
+        .enumerate()
+        .filter_map(|(row, side)| {
+            let what = match (parts[(row, row)], parts[(row, 1 - row)]) {
+                (1.0, _) => return None,
+                (0.0, 0.0) => "nothing",
+                (_, 0.0) => "backwards",
+                (_, 1.0) => "the other wheel",
+                _ => "the other wheel backwards",
+            };
+            Some(format!("the {side} {part} {what}"))
+        })
+        .collect::<Vec<_>>()
+        .join(" and ")
 }
 
 impl Moves {

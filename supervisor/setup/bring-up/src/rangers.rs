@@ -261,8 +261,12 @@ fn seen_by_cones<'a>(
     trace: &Trace,
     heading: impl Fn(f64) -> f64,
 ) -> Vec<Seen<'a>> {
-    let legs = trace.legs().into_iter().take_while(|leg| leg.told != Told::Drive);
-    let turning: Vec<_> = legs.filter(|leg| leg.told != Told::Stand).collect();
+    let turning: Vec<_> = trace
+        .legs()
+        .into_iter()
+        .take_while(|leg| leg.told != Told::Drive)
+        .filter(|leg| leg.told != Told::Stand)
+        .collect();
     let seen = |(row, sensor): (usize, &'a Sensor)| {
         let in_turn =
             readings(trace, row).filter(|it| turning.iter().any(|leg| leg.contains(it.0)));
@@ -272,8 +276,7 @@ fn seen_by_cones<'a>(
         };
         (sensor, in_turn.filter_map(echo).collect())
     };
-    let cones = table.iter().enumerate().filter(|(_, it)| it.kind == SensorKind::Cone);
-    cones.map(seen).collect()
+    table.iter().enumerate().filter(|(_, it)| it.kind == SensorKind::Cone).map(seen).collect()
 }
 
 type Seen<'a> = (&'a Sensor, Vec<(f64, f64)>);
@@ -304,9 +307,11 @@ struct Turn {
 impl Turn {
     /// Finds the best scale; `differs` returns the disagreement at a scale of the wheels' turns.
     fn best(differs: impl Fn(f64) -> Option<f64>) -> Option<Self> {
-        let scales = (-SCALES..=SCALES).map(|power| SCALE_RATIO.powi(power));
-        let each = scales.flat_map(|scale| [scale, -scale]);
-        let each: Vec<_> = each.filter_map(|scale| Some((differs(scale)?, scale))).collect();
+        let each: Vec<_> = (-SCALES..=SCALES)
+            .map(|power| SCALE_RATIO.powi(power))
+            .flat_map(|scale| [scale, -scale])
+            .filter_map(|scale| Some((differs(scale)?, scale)))
+            .collect();
         let (least, best) = each.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))?;
         let agrees = least < LEAST_DIFFERENCE_M;
         // By chance they may agree somewhat at another scale.

@@ -141,8 +141,11 @@ impl<'a> Problem<'a> {
     fn new(trace: &'a Trace, motion: &'a Motion, track_m: f64) -> Option<Self> {
         let header = trace.scans.first()?.1;
         let until = trace.rest_until_s();
-        let alike = trace.scans.iter().filter(|it| it.1.sensor == header.sensor);
-        let (at_rest, moving): (Vec<_>, Vec<_>) = alike.partition(|it| it.0 < until);
+        let (at_rest, moving): (Vec<_>, Vec<_>) = trace
+            .scans
+            .iter()
+            .filter(|it| it.1.sensor == header.sensor)
+            .partition(|it| it.0 < until);
         let beams = at_rest.iter().map(|it| it.2.len()).min().filter(|beams| *beams > 8)?;
         let median = |beam: usize| {
             let mut ranges: Vec<f64> = at_rest.iter().map(|it| f64::from(it.2[beam])).collect();
@@ -244,8 +247,10 @@ impl<'a> Problem<'a> {
         unknowns: &Unknowns,
         most_turn: f64,
     ) -> Vec<Option<f64>> {
-        let ends = self.ends(hypothesis, unknowns, most_turn);
-        ends.into_iter().map(|end| self.beyond(end?, unknowns)).collect()
+        self.ends(hypothesis, unknowns, most_turn)
+            .into_iter()
+            .map(|end| self.beyond(end?, unknowns))
+            .collect()
     }
 
     /// Performs the Gauss-Newton iterations of a stage; points at `half_m` count half.
@@ -311,10 +316,10 @@ pub(crate) fn place(mission: &Mission, trace: &Trace, motion: &Motion) -> Option
     let mut problem = Problem::new(trace, motion, mission.body().track_m)?;
     let mut best: Option<(f64, Hypothesis, Unknowns)> = None;
     let both = [false, true];
-    let hypotheses = both
+    let mut starts = both
         .into_iter()
-        .flat_map(|exchanged| both.map(|turns_back| Hypothesis { turns_back, exchanged }));
-    let mut starts = hypotheses.flat_map(|it| (0..STARTS).map(move |start| (it, start)));
+        .flat_map(|exchanged| both.map(|turns_back| Hypothesis { turns_back, exchanged }))
+        .flat_map(|it| (0..STARTS).map(move |start| (it, start)));
     // A nearly perfect solution ends the search.
     while best.as_ref().is_none_or(|(likely, ..)| *likely < CERTAIN)
         && let Some((hypothesis, start)) = starts.next()

@@ -92,8 +92,8 @@ impl Wheels {
 fn posterior_of_slip(ln_likelihood: impl Fn(f64) -> f64) -> (f64, f64) {
     const { assert!(LEAST_SLIP < PRIOR_SLIP && PRIOR_SLIP < MOST_SLIP) };
     let step = (MOST_SLIP / LEAST_SLIP).ln() / f64::from(SLIPS - 1);
-    let slips = (0..SLIPS).map(|index| LEAST_SLIP * (step * f64::from(index)).exp());
-    let posterior: Vec<(f64, f64)> = slips
+    let posterior: Vec<(f64, f64)> = (0..SLIPS)
+        .map(|index| LEAST_SLIP * (step * f64::from(index)).exp())
         .map(|slip| {
             let ln_prior = -0.5 * ((slip / PRIOR_SLIP).ln() / PRIOR_LN_SLIP).powi(2);
             (slip, ln_prior + ln_likelihood(slip))
@@ -102,8 +102,8 @@ fn posterior_of_slip(ln_likelihood: impl Fn(f64) -> f64) -> (f64, f64) {
     let most = posterior.iter().map(|(_, ln)| *ln).fold(f64::NEG_INFINITY, f64::max);
     let weights: f64 = posterior.iter().map(|(_, ln)| (ln - most).exp()).sum();
     let mean_of = |power: i32| {
-        let weighted = posterior.iter().map(|(slip, ln)| slip.powi(power) * (ln - most).exp());
-        weighted.sum::<f64>() / weights
+        posterior.iter().map(|(slip, ln)| slip.powi(power) * (ln - most).exp()).sum::<f64>()
+            / weights
     };
     let (mean, square) = (mean_of(1), mean_of(2));
     (mean, (square - mean * mean).max(0.0).sqrt())
@@ -230,8 +230,13 @@ impl Estimate {
         let freedom = (left.len() as f64 - 2.0).max(1.0);
         let chi2_per_dof = left.dot(&whitened) / freedom;
         let found = Self { values, covariance: posterior, slip, slip_sd, residuals, chi2_per_dof };
-        let numbers = found.values.iter().chain(&found.covariance).chain([&slip, &slip_sd]);
-        let is_finite = numbers.copied().all(f64::is_finite);
+        let is_finite = found
+            .values
+            .iter()
+            .chain(&found.covariance)
+            .chain([&slip, &slip_sd])
+            .copied()
+            .all(f64::is_finite);
         is_finite.then_some(found).ok_or(Refusal::Singular)
     }
 

@@ -64,8 +64,11 @@ pub fn estimate(
     body: &Body,
     by: By,
 ) -> Result<Estimate, String> {
-    let changes = commands.windows(2).filter(|pair| pair[0].1 * pair[1].1 < 0.0);
-    let turns: Vec<f64> = changes.map(|pair| pair[1].0).collect();
+    let turns: Vec<f64> = commands
+        .windows(2)
+        .filter(|pair| pair[0].1 * pair[1].1 < 0.0)
+        .map(|pair| pair[1].0)
+        .collect();
     // Each window is a turn and its return; the first starts from rest.
     let windows = turns.windows(3).map(|ends| (ends[0], ends[2]));
     let fits = windows.filter_map(|window| Fit::best(commands, headings, (body, by), window));
@@ -137,11 +140,13 @@ impl Fit {
             let better = |one: &Self, other: &Self| one.explained.total_cmp(&other.explained);
             let limited = delays.clone().flat_map(limited).max_by(better)?;
             // No limit, or for headings the stated one, wins if it explains as much.
-            let stated = (by == By::Headings).then_some(stated);
-            let simple = stated.into_iter().chain([f64::INFINITY]);
-            let mut simple = simple.filter_map(|acceleration| {
-                delays.clone().filter_map(|step| fit(at(step), acceleration)).max_by(better)
-            });
+            let mut simple = (by == By::Headings)
+                .then_some(stated)
+                .into_iter()
+                .chain([f64::INFINITY])
+                .filter_map(|acceleration| {
+                    delays.clone().filter_map(|step| fit(at(step), acceleration)).max_by(better)
+                });
             // Loss of explained share that counts as none.
             let loss = if by == By::Turns { 1e-3 } else { 1e-4 };
             let as_much = |it: &Self| it.explained >= limited.explained - loss;

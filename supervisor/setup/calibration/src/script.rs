@@ -110,8 +110,7 @@ impl Script {
             Procedure::Turns => to_and_fro(0),
             Procedure::Gyro => WITH_GYRO.get(self.leg as usize).copied(),
             Procedure::BringUp => {
-                let part = PARTS.get(self.leg as usize).copied();
-                part.or_else(|| to_and_fro(PARTS.len() as u32))
+                PARTS.get(self.leg as usize).copied().or_else(|| to_and_fro(PARTS.len() as u32))
             }
             _ => (self.leg < 8).then_some(if is_even { Leg::Side } else { Leg::Corner }),
         }

@@ -78,8 +78,10 @@ struct FreeByScan {
 impl FreeByScan {
     fn take(&mut self, at_s: f64, header: &ScanHeader, beams: &[f32]) {
         let place = DVec2::new(header.x_m, header.y_m);
-        let ends = beams.iter().enumerate().filter(|(_, range)| range.is_finite());
-        let free_m = ends
+        let free_m = beams
+            .iter()
+            .enumerate()
+            .filter(|(_, range)| range.is_finite())
             .map(|(beam, range)| {
                 let along = DVec2::from_angle(header.first_rad + header.step_rad * beam as f64);
                 place + f64::from(*range) * along
@@ -157,8 +159,10 @@ impl Process for Shell {
                 let front = ranges.iter().find(|it| usize::from(it.sensor) == self.front);
                 self.newest = Some((ranges.header().stamp.tick, front.and_then(echo_m)));
             }
-            let readings = self.newest.filter(|(tick, _)| *tick == pose.stamp.tick);
-            let mut echo_m = readings.and_then(|(_, echo_m)| echo_m);
+            let mut echo_m = self
+                .newest
+                .filter(|(tick, _)| *tick == pose.stamp.tick)
+                .and_then(|(_, echo_m)| echo_m);
             if let Some(free) = &mut self.scan {
                 while let Some(scan) = self.inputs.scan.next_slice()? {
                     free.take(scan.header().stamp.seconds(), scan.header(), &scan);
