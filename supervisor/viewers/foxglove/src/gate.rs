@@ -59,8 +59,10 @@ fn pass(mut client: &TcpStream, server: SocketAddr, origins: &[String]) -> io::R
     }
     client.set_read_timeout(None)?;
     let text = String::from_utf8_lossy(&head);
-    let headers = text.lines().filter_map(|line| line.split_once(':'));
-    let mut said = headers.filter(|(name, _)| name.trim().eq_ignore_ascii_case("origin"));
+    let mut said = text
+        .lines()
+        .filter_map(|line| line.split_once(':'))
+        .filter(|(name, _)| name.trim().eq_ignore_ascii_case("origin"));
     if said.any(|(_, origin)| !origins.iter().any(|known| known == origin.trim())) {
         return client.write_all(b"HTTP/1.1 403 Forbidden\r\nContent-Length: 0\r\n\r\n");
     }

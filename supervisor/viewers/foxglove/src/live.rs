@@ -48,8 +48,7 @@ type Readers = Vec<(&'static str, Box<dyn AnyReader>)>;
 
 /// Returns the topics that are recorded by default.
 fn served() -> impl Iterator<Item = &'static dyn AnyTopic> {
-    let all = topics::TABLE.iter().copied();
-    all.filter(|topic| matches!(topic.spec().logged, Logged::Yes))
+    topics::TABLE.iter().copied().filter(|topic| matches!(topic.spec().logged, Logged::Yes))
 }
 
 struct Serving {
@@ -136,11 +135,13 @@ impl Live {
         let drawn = drawn.map(|Channel { topic, schema, descriptors }| {
             (topic, Schema::new(schema, "protobuf", descriptors), "protobuf")
         });
-        let built = topics.chain(drawn).filter_map(|(topic, schema, encoding)| {
-            let channel = ChannelBuilder::new(&topic).context(&self.context).schema(schema);
-            Some((topic, channel.message_encoding(encoding).build_raw().ok()?))
-        });
-        built.collect()
+        topics
+            .chain(drawn)
+            .filter_map(|(topic, schema, encoding)| {
+                let channel = ChannelBuilder::new(&topic).context(&self.context).schema(schema);
+                Some((topic, channel.message_encoding(encoding).build_raw().ok()?))
+            })
+            .collect()
     }
 }
 

@@ -26,8 +26,11 @@ impl Token {
 
     /// Compares in constant time for equal lengths.
     fn is(&self, shown: &str) -> bool {
-        let pairs = self.0.bytes().zip(shown.bytes());
-        let differing = pairs.fold(0, |differing, (one, other)| differing | (one ^ other));
+        let differing = self
+            .0
+            .bytes()
+            .zip(shown.bytes())
+            .fold(0, |differing, (one, other)| differing | (one ^ other));
         self.0.len() == shown.len() && differing == 0
     }
 }

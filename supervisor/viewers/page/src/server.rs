@@ -113,10 +113,11 @@ async fn session(context: &Arc<Context>, request: Request, place: Place) -> Resp
         Err(refused) => return refused.into_response(),
     };
     let context = context.clone();
-    let upgrade = upgrade.max_message_size(MOST_MESSAGE_BYTES).max_frame_size(MOST_MESSAGE_BYTES);
-    upgrade.on_upgrade(async move |socket| {
-        session::run(socket, place, &context).await;
-    })
+    upgrade.max_message_size(MOST_MESSAGE_BYTES).max_frame_size(MOST_MESSAGE_BYTES).on_upgrade(
+        async move |socket| {
+            session::run(socket, place, &context).await;
+        },
+    )
 }
 
 fn single<'a>(headers: &'a HeaderMap, name: &header::HeaderName) -> Option<&'a str> {

@@ -105,8 +105,12 @@ fn keep(domain: &Domain, port: u16, addresses: &str) -> Result<PathBuf, FileErro
     let written = make_own_directory(directory).map_err(io::Error::other).and_then(|()| {
         // A killed page leaves its file.
         let _ = fs::remove_file(&file);
-        let made = fs::OpenOptions::new().write(true).create_new(true).mode(0o600).open(&file);
-        made?.write_all(addresses.as_bytes())
+        fs::OpenOptions::new()
+            .write(true)
+            .create_new(true)
+            .mode(0o600)
+            .open(&file)?
+            .write_all(addresses.as_bytes())
     });
     written.map_err(FileError::of("keep", &file)).map(|()| file)
 }

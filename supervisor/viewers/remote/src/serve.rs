@@ -104,15 +104,19 @@ pub fn serve(arguments: &Arguments) -> Result {
         serde_json::to_vec(&hello).unwrap_or_default()
     })?;
     let _run = answer(&session, robot, "run", &told, |told| told.run.clone().into_bytes())?;
-    let publishers = topics.iter().map(|topic| {
-        let key = format!("firsthand/{robot}/topic/{}", topic.spec().name);
-        session.declare_publisher(key).wait().map_err(failed)
-    });
-    let publishers = publishers.collect::<Result<Vec<_>>>()?;
+    let publishers = topics
+        .iter()
+        .map(|topic| {
+            let key = format!("firsthand/{robot}/topic/{}", topic.spec().name);
+            session.declare_publisher(key).wait().map_err(failed)
+        })
+        .collect::<Result<Vec<_>>>()?;
     let domain = robot.domain();
     let open = |bus: &Bus| {
-        let readers = topics.iter().map(|topic| topic.recorder_reader(bus));
-        let readers = readers.collect::<Result<_, BusError>>()?;
+        let readers = topics
+            .iter()
+            .map(|topic| topic.recorder_reader(bus))
+            .collect::<Result<_, BusError>>()?;
         Ok(Readers { topics: readers, roster: bus.reader(&topics::ROSTER)? })
     };
     let mut follower = Follower::new(domain.clone(), "remote", &topics::LINK, open)
@@ -132,8 +136,11 @@ pub fn serve(arguments: &Arguments) -> Result {
                     while reader.next_message(&mut message)?.is_some() {
                         // A slow link drops samples.
                         let sent = Sent { id, sent_ns: monotonic_ns() }.encoded();
-                        let put = publisher.put(message.as_slice()).attachment(sent);
-                        put.wait().map_err(failed)?;
+                        publisher
+                            .put(message.as_slice())
+                            .attachment(sent)
+                            .wait()
+                            .map_err(failed)?;
                     }
                 }
             }
@@ -176,11 +183,14 @@ fn answer(
 ) -> Result<Answering> {
     let key = format!("firsthand/{robot}/{what}");
     let (told, own) = (Arc::clone(told), key.clone());
-    let queryable = session.declare_queryable(key).callback(move |query| {
-        let bytes = bytes(&lock(&told));
-        let _ = query.reply(own.as_str(), bytes).wait();
-    });
-    queryable.wait().map_err(failed)
+    session
+        .declare_queryable(key)
+        .callback(move |query| {
+            let bytes = bytes(&lock(&told));
+            let _ = query.reply(own.as_str(), bytes).wait();
+        })
+        .wait()
+        .map_err(failed)
 }
 
 fn lock(told: &Mutex<Told>) -> MutexGuard<'_, Told> {

@@ -67,10 +67,13 @@ pub fn show(arguments: &Arguments) -> Result {
     let key = format!("firsthand/{robot}/topic/");
     let (sender, samples) = sync_channel(WAITING);
     // The session thread must not block: it also carries answers and keep-alives.
-    let subscribed = session.declare_subscriber(format!("{key}*")).callback(move |sample| {
-        let _ = sender.try_send(sample);
-    });
-    let _subscribed = subscribed.wait().map_err(failed)?;
+    let _subscribed = session
+        .declare_subscriber(format!("{key}*"))
+        .callback(move |sample| {
+            let _ = sender.try_send(sample);
+        })
+        .wait()
+        .map_err(failed)?;
     let domain = Domain::of(named.as_ref().unwrap_or(robot).clone());
     let place = connecting.endpoint(host);
     let mut asker = Asker::new(&session, robot);
@@ -142,8 +145,7 @@ impl<'a> Asker<'a> {
 
     fn ask(&self, what: &str) -> Result<FifoChannelHandler<Reply>> {
         let key = format!("firsthand/{}/{what}", self.robot);
-        let asked = self.session.get(key).timeout(PATIENCE).with(FifoChannel::new(4));
-        asked.wait().map_err(failed)
+        self.session.get(key).timeout(PATIENCE).with(FifoChannel::new(4)).wait().map_err(failed)
     }
 
     /// Returns a new answer, if any. Repeats the request when due.

@@ -25,9 +25,10 @@ pub struct Arguments {
 /// Makes a bag. Returns a description of its content and gaps.
 pub fn make(namespace: &str, arguments: &Arguments) -> Result<String, Failure> {
     let Arguments { recording, out } = arguments;
-    let files = recording::files(recording)?;
-    let recordings: Vec<_> =
-        files.iter().map(|file| Recording::open(file)).collect::<Result<_, _>>()?;
+    let recordings: Vec<_> = recording::files(recording)?
+        .iter()
+        .map(|file| Recording::open(file))
+        .collect::<Result<_, _>>()?;
     let run = &recordings[0].run;
     let mut shown = Shown::new(run.robot.to_string(), run.mission.clone());
     let mut bag = Bag::create(out)?;

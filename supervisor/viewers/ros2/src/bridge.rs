@@ -92,8 +92,8 @@ pub fn serve(
     let robot = &options.robot;
     let robot_domain = robot.domain();
     let join = || {
-        let node = endpoints::open(network, options, parameters.clone());
-        node.map_err(|source| BridgeError::Join { domain: network.0, source })
+        endpoints::open(network, options, parameters.clone())
+            .map_err(|source| BridgeError::Join { domain: network.0, source })
     };
     let mut continued = Signals::catch(&[SIGCONT])?;
     let mut bridge = Bridge {
@@ -171,8 +171,8 @@ impl Bridge<'_> {
             return Err(BridgeError::Overlap { topic: topic.clone(), domain });
         }
         let is_own = |id| own.iter().any(|(own, _)| *own == id);
-        let topics = published(namespace, shown.sensor_topics());
-        let topics = topics.filter(|(_, id, _)| is_of_robot(*id) && !is_own(*id));
+        let topics = published(namespace, shown.sensor_topics())
+            .filter(|(_, id, _)| is_of_robot(*id) && !is_own(*id));
         let opened = endpoints::open_robot(&mut self.node, topics);
         if let (MissionClock::Wall { rate, .. }, false) = (run.clock, clock) {
             shown.pace = rate;

@@ -71,8 +71,13 @@ impl Drift {
 
     fn covariance(&self, model: &Odometry) -> Covariance {
         let shares = [model.diameter_ratio_sd, model.track_scale_sd, model.distance_scale_sd];
-        let errors = self.systematic.iter().zip(shares).map(|(error, sd)| outer(*error * sd));
-        let [x, y, turn] = errors.fold(self.slipped, |sum, error| sum + error).to_cols_array_2d();
+        let [x, y, turn] = self
+            .systematic
+            .iter()
+            .zip(shares)
+            .map(|(error, sd)| outer(*error * sd))
+            .fold(self.slipped, |sum, error| sum + error)
+            .to_cols_array_2d();
         let covariance = [x[0], x[1], x[2], y[1], y[2], turn[2]];
         let mut whole = PoseSample { covariance, ..PoseSample::default() }.covariance_6x6();
         for part in [2, 3, 4] {

@@ -75,12 +75,15 @@ pub fn published<'a>(
     sensors: impl Iterator<Item = (Id, &'a str)>,
 ) -> impl Iterator<Item = Published> {
     let is_sensor = |id| matches!(id, Id::Range(_) | Id::Scan(_));
-    let others = TABLE.iter().filter(move |row| row.accepted_by.is_none() && !is_sensor(row.id));
-    let topics = others.map(|row| (row.id, "")).chain(sensors);
-    topics.filter_map(move |(id, sensor)| {
-        let row = spec(id)?;
-        Some((row, id, full_name(namespace, &topic_name(row, sensor))))
-    })
+    TABLE
+        .iter()
+        .filter(move |row| row.accepted_by.is_none() && !is_sensor(row.id))
+        .map(|row| (row.id, ""))
+        .chain(sensors)
+        .filter_map(move |(id, sensor)| {
+            let row = spec(id)?;
+            Some((row, id, full_name(namespace, &topic_name(row, sensor))))
+        })
 }
 
 pub fn topic_name(row: &Spec, sensor: &str) -> String {

@@ -49,13 +49,15 @@ impl Frames {
     ) -> Result<DAffine2, String> {
         let [(ends, of_frames), (also_ends, of_roots)] =
             [frame, root].map(|it| self.climb(it, since));
-        let meet = of_frames.iter().find_map(|(common, pose)| {
-            let (_, of_root) = of_roots.iter().find(|(other, _)| other == common)?;
-            Some(of_root.inverse() * *pose)
-        });
-        meet.ok_or_else(|| {
-            format!("no transforms join {frame:?} and {root:?}: {ends}, {also_ends}")
-        })
+        of_frames
+            .iter()
+            .find_map(|(common, pose)| {
+                let (_, of_root) = of_roots.iter().find(|(other, _)| other == common)?;
+                Some(of_root.inverse() * *pose)
+            })
+            .ok_or_else(|| {
+                format!("no transforms join {frame:?} and {root:?}: {ends}, {also_ends}")
+            })
     }
 
     /// Returns the pose of `frame` in each ancestor, and why the chain ends.

@@ -19,8 +19,10 @@ pub fn overlap<'a>(
         _ => false,
     };
     let read: Vec<_> = read(&run.mission).filter(|_| reads).collect();
-    let named = published(namespace, sensors).map(|(_, id, name)| (id, name));
-    named.filter(|(_, name)| read.contains(name)).collect()
+    published(namespace, sensors)
+        .map(|(_, id, name)| (id, name))
+        .filter(|(_, name)| read.contains(name))
+        .collect()
 }
 
 fn read(mission: &Mission) -> impl Iterator<Item = String> {

@@ -62,8 +62,8 @@ pub fn of_options(mut command: &Command, mut matches: &ArgMatches) -> Vec<Parame
 fn value(option: &Arg, matches: &ArgMatches) -> Option<ParameterValue> {
     let id = option.get_id().as_str();
     let mut value = ParameterValue::default();
-    let written = matches.get_raw(id).into_iter().flatten();
-    let mut texts = written.map(|text| text.to_string_lossy().into_owned());
+    let mut texts =
+        matches.get_raw(id).into_iter().flatten().map(|text| text.to_string_lossy().into_owned());
     let is = |of: &[TypeId]| of.iter().any(|of| option.get_value_parser().type_id() == *of);
     value.r#type = if !option.get_action().takes_values() {
         value.bool_value = matches.try_get_one(id).ok().flatten().copied()?;
@@ -110,14 +110,16 @@ pub fn reply(
         },
     };
     let refused = || {
-        let asked = SetParametersRequest::decode(payload)?.parameters;
-        Ok(asked.iter().map(refuse).collect::<Vec<_>>())
+        Ok(SetParametersRequest::decode(payload)?.parameters.iter().map(refuse).collect::<Vec<_>>())
     };
     Ok(match service {
         Service::List => {
             let asked = ListParametersRequest::decode(payload)?.prefixes;
-            let names = parameters.iter().map(|parameter| parameter.name.clone());
-            let names = names.filter(|name| asked.is_empty() || asked.contains(name)).collect();
+            let names = parameters
+                .iter()
+                .map(|parameter| parameter.name.clone())
+                .filter(|name| asked.is_empty() || asked.contains(name))
+                .collect();
             let result = ListParametersResult { names, prefixes: Vec::new() };
             ListParametersResponse { result }.encode()
         }

@@ -135,8 +135,11 @@ fn amount(text: &str) -> Result<f64, String> {
 
 /// Returns the radius of the outline's largest circle around the robot's centre.
 fn inscribed(text: &str) -> Result<f64, String> {
-    let words = text.split(['[', ']', ',', ' ']).filter(|word| !word.is_empty());
-    let numbers: Vec<f64> = words.map_while(|word| word.parse().ok()).collect();
+    let numbers: Vec<f64> = text
+        .split(['[', ']', ',', ' '])
+        .filter(|word| !word.is_empty())
+        .map_while(|word| word.parse().ok())
+        .collect();
     let corners: Vec<_> = numbers.chunks_exact(2).map(DVec2::from_slice).collect();
     if corners.len() < 3 || text.matches(',').count() + 1 != numbers.len() {
         return Err("not an outline; give three or more corners as [[x, y], ...]".to_owned());
@@ -173,8 +176,8 @@ pub fn serve(
     ended: &mut dyn FnMut() -> bool,
 ) -> Result<(), BridgeError> {
     let open = || {
-        let node = open(network, options, parameters.clone());
-        let node = node.map_err(|source| BridgeError::Join { domain: network.0, source })?;
+        let node = open(network, options, parameters.clone())
+            .map_err(|source| BridgeError::Join { domain: network.0, source })?;
         Server::new(options, node).map_err(BridgeError::System)
     };
     let mut continued = Signals::catch(&[SIGCONT])?;
@@ -274,8 +277,12 @@ impl<'a> Server<'a> {
             *known = asked.to_vec();
         }
         let here = env::var("ROS_DISTRO").unwrap_or_default();
-        let here = Release::ALL.iter().find(|(name, it)| *name == here && known.contains(it));
-        here.map(|(_, release)| *release).or(known.first().copied()).unwrap_or_default()
+        Release::ALL
+            .iter()
+            .find(|(name, it)| *name == here && known.contains(it))
+            .map(|(_, release)| *release)
+            .or(known.first().copied())
+            .unwrap_or_default()
     }
 
     fn turn(&mut self) {
@@ -378,8 +385,9 @@ impl<'a> Server<'a> {
         let at_ns = self.now_ns();
         self.goals[action].accept(id, plan, at_ns);
         let begun = self.job(action, asked, cancellation).and_then(|job| {
-            let sent = self.jobs.try_send(job);
-            sent.map_err(|_| (Reason::Timeout, "too many goals wait already".to_owned()))
+            self.jobs
+                .try_send(job)
+                .map_err(|_| (Reason::Timeout, "too many goals wait already".to_owned()))
         });
         if let Err(failure) = begun {
             let outcome = Outcome { at_ns, failure: Some(failure), ..Outcome::default() };

@@ -18,8 +18,7 @@ pub enum Action {
 
 impl Action {
     fn name(self) -> &'static str {
-        let row = KEYS.iter().find(|(_, _, key)| *key == Key::Act(self));
-        row.map_or("", |(_, name, _)| name)
+        KEYS.iter().find(|(_, _, key)| *key == Key::Act(self)).map_or("", |(_, name, _)| name)
     }
 
     fn perform(self, robot: &RobotName, stage: &str) -> Result<(), String> {

@@ -28,16 +28,16 @@ struct Output {
 impl ScreenFeed {
     pub fn open(bus: &Bus) -> Result<Self, BusError> {
         let now = Instant::now();
-        let first_outputs = stages::TABLE
+        let outputs = stages::TABLE
             .iter()
-            .filter_map(|stage| Some((stage.name, *stage.wiring.outputs.first()?)));
-        let outputs = first_outputs.map(|(stage, topic)| {
-            Ok(Output {
-                stage,
-                reader: topic.any_reader(bus)?,
-                rates: TopicRates::new(topic.spec(), now),
-            })
-        });
+            .filter_map(|stage| Some((stage.name, *stage.wiring.outputs.first()?)))
+            .map(|(stage, topic)| {
+                Ok(Output {
+                    stage,
+                    reader: topic.any_reader(bus)?,
+                    rates: TopicRates::new(topic.spec(), now),
+                })
+            });
         Ok(Self {
             feed: Feed::open(bus, TOPICS)?,
             outputs: outputs.collect::<Result<_, BusError>>()?,

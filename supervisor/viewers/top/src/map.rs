@@ -51,13 +51,13 @@ const fn hazard(state: CellState) -> Option<Color> {
 }
 
 pub fn legend() -> [(char, Style, &'static str); 4] {
-    let hazards = [
+    [
         (CellState::Sensed, "sensed"),
         (CellState::Margin, "margin"),
         (CellState::Known, "known"),
         (CellState::Perimeter, "perimeter"),
-    ];
-    hazards.map(|(state, what)| ('█', Style::new().fg(hazard(state).unwrap_or_default()), what))
+    ]
+    .map(|(state, what)| ('█', Style::new().fg(hazard(state).unwrap_or_default()), what))
 }
 
 struct Scale {
@@ -129,8 +129,7 @@ fn letter(state: &RobotState, scale: &Scale, col: usize, line: usize) -> (char, 
         let (cells, side) = (state.map.cells(), scale.frame.cells as usize);
         let rows = scale.cells(scale.side - 1 - row);
         let cols = scale.cells(col);
-        let of_rows = rows.flat_map(|row| &cells[row * side + cols.start..row * side + cols.end]);
-        of_rows
+        rows.flat_map(|row| &cells[row * side + cols.start..row * side + cols.end])
             .map(|&cell| CellState::from_byte(cell))
             .max_by_key(importance)
             .unwrap_or(CellState::Free)
@@ -145,13 +144,10 @@ fn letter(state: &RobotState, scale: &Scale, col: usize, line: usize) -> (char, 
         (Some(one), Some(other)) => ('▀', Style::new().fg(one).bg(other)),
         (Some(one), None) => ('▀', Style::new().fg(one).bg(ground(below))),
         (None, Some(other)) => ('▄', Style::new().fg(other).bg(ground(above))),
-        (None, None) => {
-            let arrow = field(state, scale, col, line);
-            (
-                arrow.unwrap_or(' '),
-                FIELD_STYLE.bg(ground(if above == CellState::Free { below } else { above })),
-            )
-        }
+        (None, None) => (
+            field(state, scale, col, line).unwrap_or(' '),
+            FIELD_STYLE.bg(ground(if above == CellState::Free { below } else { above })),
+        ),
     }
 }
 

@@ -49,8 +49,8 @@ pub fn draw(view: &View, frame: &mut Frame<'_>) {
     let [map, text] = if is_wide { [right, below] } else { split(below, side) };
     table(view, frame, stages);
     details(view, frame, text);
-    let lines = map::lines(&view.state, map.width, map.height);
-    let lines = lines.unwrap_or_else(|| vec![Line::styled("no map yet", DIM)]);
+    let lines = map::lines(&view.state, map.width, map.height)
+        .unwrap_or_else(|| vec![Line::styled("no map yet", DIM)]);
     frame.render_widget(Paragraph::new(lines), map);
     let wrapped = Paragraph::new(view.message.as_str()).wrap(Wrap { trim: true });
     frame.render_widget(wrapped, message);
@@ -86,10 +86,12 @@ fn heading(view: &View) -> Line<'static> {
 fn explained(
     signs: impl IntoIterator<Item = (impl ToString, Style, &'static str)>,
 ) -> Line<'static> {
-    let spans = signs.into_iter().flat_map(|(sign, style, what)| {
-        [Span::styled(sign.to_string(), style), Span::styled(format!(" {what}  "), DIM)]
-    });
-    spans.collect()
+    signs
+        .into_iter()
+        .flat_map(|(sign, style, what)| {
+            [Span::styled(sign.to_string(), style), Span::styled(format!(" {what}  "), DIM)]
+        })
+        .collect()
 }
 
 fn table(view: &View, frame: &mut Frame<'_>, area: Rect) {
@@ -111,8 +113,7 @@ fn table(view: &View, frame: &mut Frame<'_>, area: Rect) {
     let widths: [u16; 9] = [14, 11, 7, 3, 8, 7, 7, 5, 8];
     let heads = ["stage", "state", "pid", "gen", "restarts", "rate", "beat", "CPU", "memory"];
     let row = |texts: [String; 9], style| {
-        let cells = texts.into_iter().zip(widths).enumerate();
-        let cells = cells.map(|(at, (text, width))| match at {
+        let cells = texts.into_iter().zip(widths).enumerate().map(|(at, (text, width))| match at {
             0 | 1 => text,
             _ => format!("{text:>width$}", width = usize::from(width)),
         });
@@ -175,9 +176,11 @@ fn details(view: &View, frame: &mut Frame<'_>, area: Rect) {
     let legend = legend(usize::from(area.width));
     let room = usize::from(area.height).saturating_sub(lines.len() + legend.len() + 1);
     lines.push(Line::default());
-    let events = view.events.iter().take(room);
     lines.extend(
-        events.map(|event| Line::raw(format!("{}: {}, {:.1} s", event.of, event.text, event.t))),
+        view.events
+            .iter()
+            .take(room)
+            .map(|event| Line::raw(format!("{}: {}, {:.1} s", event.of, event.text, event.t))),
     );
     let [above, foot] =
         Layout::vertical([Constraint::Min(0), Constraint::Length(legend.len() as u16)]).areas(area);

@@ -31,8 +31,7 @@ impl View {
     }
 
     pub fn chosen_stage(&self) -> Option<&str> {
-        let stage = self.state.stages.get(self.chosen);
-        stage.map(|entry| name_str(&entry.stage))
+        self.state.stages.get(self.chosen).map(|entry| name_str(&entry.stage))
     }
 
     pub fn choose(&mut self, down: isize) {

@@ -54,9 +54,11 @@ pub struct Outcome {
 pub fn result(status: i8, outcome: &Outcome, codes: u16, release: Release) -> Vec<u8> {
     let path = path(Header::at(outcome.at_ns, &outcome.frame), &outcome.path);
     let planning_time = outcome.took_ns.into();
-    let failure = outcome.failure.as_ref();
-    let (error_code, error_msg) =
-        failure.map(|(reason, text)| (codes + *reason as u16, text.clone())).unwrap_or_default();
+    let (error_code, error_msg) = outcome
+        .failure
+        .as_ref()
+        .map(|(reason, text)| (codes + *reason as u16, text.clone()))
+        .unwrap_or_default();
     if codes < ComputePathThroughPosesResult::UNKNOWN {
         let result = ComputePathToPoseResult { path, planning_time, error_code, error_msg };
         ComputePathToPoseGetResultResponse { status, result }.encode_for(release)

@@ -113,8 +113,9 @@ impl Costmap {
         let squares = self.squares(radius.max(reach) as usize, obstacle);
         let (radius, a_metre) = ((radius * radius) as f32, self.resolution_m.powi(-2) as f32);
         let dear = |value: i8| 1.0 + (DEAREST - 1.0) / 98.0 * f32::from(value.max(0));
-        let cells = squares.iter().zip(&self.cells);
-        cells
+        squares
+            .iter()
+            .zip(&self.cells)
             .map(|(&square, &value)| {
                 let is_blocked = square <= radius || body.is_occupied(value);
                 (is_blocked, (a_metre / square.max(1.0) * dear(value)).min(most))
