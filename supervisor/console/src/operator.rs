@@ -77,6 +77,8 @@ fn cannot_signal(stage: &str, pid: u32, error: &io::Error) -> String {
 }
 
 fn no_process(robot: &RobotName, stage: &str) -> Refused {
-    let message = format!("{stage} of robot {robot} has no process now; see `firsthand status`");
-    Refused::new("no-process", message)
+    Refused::new(
+        "no-process",
+        format!("{stage} of robot {robot} has no process now; see `firsthand status`"),
+    )
 }

@@ -62,10 +62,12 @@ pub(crate) fn arrived(distance_m: f64, beside: Option<DVec2>) -> Ending {
     let Some(place) = beside else {
         return Ending::asked_for(Outcome::Reached, reason);
     };
-    let reason = format!(
-        "{reason}, at {place:.2}: the nearest point that a hazard allows, outside arrival_tolerance_m"
-    );
-    Ending::failed(Outcome::Unreachable, reason)
+    Ending::failed(
+        Outcome::Unreachable,
+        format!(
+            "{reason}, at {place:.2}: the nearest point that a hazard allows, outside arrival_tolerance_m"
+        ),
+    )
 }
 
 pub(crate) fn touched([x, y]: [f64; 2]) -> Ending {
@@ -107,8 +109,8 @@ impl Snapshot<'_> {
     }
 
     fn simulator_ended(&self) -> Option<Ending> {
-        let reason = "the simulated robot ended; see x80-sim.log";
-        self.simulator_ended.then(|| Ending::failed(Outcome::Aborted, reason))
+        self.simulator_ended
+            .then(|| Ending::failed(Outcome::Aborted, "the simulated robot ended; see x80-sim.log"))
     }
 
     /// Accepts an arrival once the encoders report rest. In lockstep no command follows, so it
@@ -130,8 +132,10 @@ impl Snapshot<'_> {
         let link = self.link.filter(|link| link.action() == Action::End)?;
         let rule = failsafe::rule(link.cause())?;
         let name = rule.cause.name();
-        let reason = format!("{name}: {}", rule.when);
-        Some(Ending { cause: Some(name), ..Ending::failed(Outcome::Aborted, reason) })
+        Some(Ending {
+            cause: Some(name),
+            ..Ending::failed(Outcome::Aborted, format!("{name}: {}", rule.when))
+        })
     }
 
     fn overran(&self) -> Option<Ending> {

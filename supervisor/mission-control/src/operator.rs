@@ -156,8 +156,10 @@ fn guard(domain: &Domain) -> Result<Operator> {
         match told()? {
             Some(guard) => return Ok(guard),
             None if began.elapsed() > PATIENCE => {
-                let message = "the stop guard does not start; see link.log of the run";
-                return refuse("no-answer", message);
+                return refuse(
+                    "no-answer",
+                    "the stop guard does not start; see link.log of the run",
+                );
             }
             None => thread::park_timeout(GUARD_STARTS),
         }
@@ -407,19 +409,24 @@ fn request(kind: RequestKind) -> RequestSample {
 }
 
 fn refused(robot: &RobotName, answer: RequestAnswer) -> OperatorError {
-    let message = format!("the supervisor of robot {robot} refuses: {}", answer.text());
-    Refused::new(code(answer), message).into()
+    Refused::new(
+        code(answer),
+        format!("the supervisor of robot {robot} refuses: {}", answer.text()),
+    )
+    .into()
 }
 
 /// # Errors
 /// Fails if `domain` is a mirror; the order belongs on the robot's machine.
 pub fn refuse_mirror(domain: &Domain) -> Result {
     let Some(at) = domain.mirrors() else { return Ok(()) };
-    let message = format!(
-        "this is a mirror of robot {} at {at}, which accepts no orders; give them on its machine",
-        domain.robot
-    );
-    refuse("mirror", message)
+    refuse(
+        "mirror",
+        format!(
+            "this is a mirror of robot {} at {at}, which accepts no orders; give them on its machine",
+            domain.robot
+        ),
+    )
 }
 
 fn ask(robot: &RobotName, request: RequestSample) -> Result {
@@ -471,10 +478,12 @@ pub fn find<T>(
             return Ok(found);
         }
         if ran() <= before || began.elapsed() >= STARVED_PATIENCE {
-            let message = format!(
-                "the supervisor of robot {robot} does not answer; is it frozen? (`firsthand stage thaw supervisor`)"
+            return refuse(
+                "no-answer",
+                format!(
+                    "the supervisor of robot {robot} does not answer; is it frozen? (`firsthand stage thaw supervisor`)"
+                ),
             );
-            return refuse("no-answer", message);
         }
     }
 }

@@ -48,8 +48,8 @@ pub struct SupervisorState {
 
 impl SupervisorState {
     pub(crate) fn open(directory: &Path) -> Result<(Checkpoint, Self), CheckpointError> {
-        let file = run::checkpoint_file(directory, "supervisor");
-        let (checkpoint, state) = Checkpoint::open::<Self>(&file, CAPACITY)?;
+        let (checkpoint, state) =
+            Checkpoint::open::<Self>(&run::checkpoint_file(directory, "supervisor"), CAPACITY)?;
         Ok((checkpoint, state.unwrap_or_default()))
     }
 }

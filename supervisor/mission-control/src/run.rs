@@ -164,8 +164,8 @@ pub(crate) fn conduct<'a>(
     let (replans, resets) = supervisor.stall_watch.recoveries(decided.last_tick);
     truth.truncate(decided.truth_ticks);
     let (ended, at_rest) = (truth.last(), record.pose.as_ref());
-    let place = targets.current.position();
-    let ending = decided.ending.checked(&options.mission, place, ended, at_rest);
+    let ending =
+        decided.ending.checked(&options.mission, targets.current.position(), ended, at_rest);
     let recorded = targets.recorded;
     let targets = targets.results(&ending, decided.last_tick, record.arrival.as_ref(), ended);
     for result in targets.iter().skip(recorded) {

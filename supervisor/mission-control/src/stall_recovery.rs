@@ -95,8 +95,10 @@ impl Supervisor<'_> {
     fn given_up(&self) -> Option<(u64, Ending)> {
         let stall = self.stall_watch.gave_up()?;
         let words = stall::words(stall.cause(), &self.options.mission.body());
-        let reason = format!("target unreachable: {words}");
-        Some((stall.stamp.tick, Ending::failed(Outcome::Unreachable, reason)))
+        Some((
+            stall.stamp.tick,
+            Ending::failed(Outcome::Unreachable, format!("target unreachable: {words}")),
+        ))
     }
 
     /// Like [`Self::given_up`], and in lockstep checks the ticks that the loop left unchecked;

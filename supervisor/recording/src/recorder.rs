@@ -171,8 +171,8 @@ pub fn record(
                 Some(current) => current.losses.joined_again(),
                 None => {
                     files += 1;
-                    let file = numbered(&options.out, files);
-                    current = Some(CurrentRun::begin(options, &file, run)?);
+                    current =
+                        Some(CurrentRun::begin(options, &numbered(&options.out, files), run)?);
                 }
             }
             if let Some(current) = &current {

@@ -120,8 +120,11 @@ impl Events {
             tail => format!("; its log ends: {tail}"),
         };
         let (generation, cause) = (death.generation, death_in_words(death));
-        let text = format!("generation {generation} died ({hung}{cause}){log_tail}");
-        self.add(name_str(&death.stage), Kind::Bad, text);
+        self.add(
+            name_str(&death.stage),
+            Kind::Bad,
+            format!("generation {generation} died ({hung}{cause}){log_tail}"),
+        );
     }
 
     fn roster(&mut self, entries: &[RosterEntry]) {
@@ -202,8 +205,11 @@ impl Events {
             return;
         }
         let at = target.target.position();
-        let text = format!("target {}: ({:.2}, {:.2})", target.number, at.x, at.y);
-        self.add("supervisor", Kind::Note, text);
+        self.add(
+            "supervisor",
+            Kind::Note,
+            format!("target {}: ({:.2}, {:.2})", target.number, at.x, at.y),
+        );
     }
 
     fn following(&mut self, following: &FollowingSample) {
@@ -217,8 +223,11 @@ impl Events {
         let arrived = command.state() == CommandState::Arrived;
         if arrived && self.arrived != command.target_number && !self.follows {
             self.arrived = command.target_number;
-            let text = format!("target {} is reached", command.target_number);
-            self.add("controller", Kind::Good, text);
+            self.add(
+                "controller",
+                Kind::Good,
+                format!("target {} is reached", command.target_number),
+            );
         }
     }
 

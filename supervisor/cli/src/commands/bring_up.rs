@@ -115,8 +115,10 @@ fn judged(found: &[Finding]) -> Result {
     }
     // The first finding, the rate of the reports, needs no motion.
     if found.iter().skip(1).all(|finding| finding.verdict == Verdict::Unknown) {
-        let message = "nothing was measured: the robot did not move, or its sensors reported nothing; see the link's log in the run directory";
-        return refuse("nothing-measured", message);
+        return refuse(
+            "nothing-measured",
+            "nothing was measured: the robot did not move, or its sensors reported nothing; see the link's log in the run directory",
+        );
     }
     Ok(())
 }

@@ -98,8 +98,10 @@ fn await_result(
 pub fn points(places: &[f64]) -> Result<Vec<TargetPoint>> {
     let (places, rest) = places.as_chunks::<2>();
     if !rest.is_empty() {
-        let message = format!("{} is an X without a Y; give two numbers for each place", rest[0]);
-        return refuse("no-target", message);
+        return refuse(
+            "no-target",
+            format!("{} is an X without a Y; give two numbers for each place", rest[0]),
+        );
     }
     Ok(places.iter().map(|&place| TargetPoint::at(place.into())).collect())
 }

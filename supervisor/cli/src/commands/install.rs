@@ -106,11 +106,13 @@ fn refuse_hidden(executable: &Path) -> Result {
         return Ok(());
     }
     let executable = executable.display();
-    let message = format!(
-        "{executable} lies in a home directory, which a service cannot read; `sudo install {executable} /usr/local/bin/`, then \
-         `sudo /usr/local/bin/firsthand install`"
-    );
-    refuse("home-directory", message)
+    refuse(
+        "home-directory",
+        format!(
+            "{executable} lies in a home directory, which a service cannot read; `sudo install {executable} /usr/local/bin/`, then \
+             `sudo /usr/local/bin/firsthand install`"
+        ),
+    )
 }
 
 fn put(file: &Path, text: &str) -> Result {

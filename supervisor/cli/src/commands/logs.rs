@@ -53,8 +53,10 @@ fn opened(arguments: &Arguments, directory: &Path) -> Result<Logs> {
     let processes = Logs::processes(directory).map_err(unreadable)?;
     if let Some(stage) = stage.filter(|stage| !processes.iter().any(|it| it == stage)) {
         let (directory, there) = (directory.display(), processes.join(", "));
-        let message = format!("{stage:?} has no log in {directory}; there are {there}");
-        return refuse("unknown-process", message);
+        return refuse(
+            "unknown-process",
+            format!("{stage:?} has no log in {directory}; there are {there}"),
+        );
     }
     Ok(Logs::of(directory, stage))
 }

@@ -20,6 +20,5 @@ pub struct Arguments {
 }
 
 pub fn main(arguments: &Arguments) -> Result {
-    let page = report::write(&arguments.run, arguments.out.as_deref())?;
-    print_line(page.display())
+    print_line(report::write(&arguments.run, arguments.out.as_deref())?.display())
 }

@@ -121,10 +121,12 @@ fn options(arguments: &Arguments) -> Result<Options> {
     if let Some(directory) = &arguments.resume {
         let found = fs::canonicalize(directory).map_err(|error| {
             let directory = directory.display();
-            let message = format!(
-                "cannot resume the run in {directory}: {error}; give the directory of a run"
-            );
-            Refused::new("no-run", message)
+            Refused::new(
+                "no-run",
+                format!(
+                    "cannot resume the run in {directory}: {error}; give the directory of a run"
+                ),
+            )
         })?;
         return resumed(arguments, found);
     }
@@ -236,10 +238,12 @@ pub fn ready(name: &str, set: &[String]) -> Result<Mission> {
         && !device.exists()
     {
         let device = device.display();
-        let message = format!(
-            "robot.address: {device} does not exist; plug in its adapter, or name another (`ls -l /dev/serial/by-id`)"
+        return refuse(
+            "no-device",
+            format!(
+                "robot.address: {device} does not exist; plug in its adapter, or name another (`ls -l /dev/serial/by-id`)"
+            ),
         );
-        return refuse("no-device", message);
     }
     planner_executable::resolve(&mut mission, OTHER_PLANNERS)?;
     refuse_without_memory(&mission)?;
@@ -259,18 +263,22 @@ fn refuse_without_memory(mission: &Mission) -> Result {
     if u64::from(cells) <= most {
         return Ok(());
     }
-    let message = format!(
-        "perimeter.cells: {cells} x {cells} cells need more memory than this machine has free; give {most} or fewer"
-    );
-    refuse("mission", message)
+    refuse(
+        "mission",
+        format!(
+            "perimeter.cells: {cells} x {cells} cells need more memory than this machine has free; give {most} or fewer"
+        ),
+    )
 }
 
 fn refuse_unspoken(mission: &Mission) -> Result {
     if mission.robot.protocol() != Protocol::Ros2 || SPEAKS_ROS2 {
         return Ok(());
     }
-    let message = "robot.protocol: this executable is built without ROS 2; build it with `cargo build --release --features ros2`";
-    refuse("mission", message)
+    refuse(
+        "mission",
+        "robot.protocol: this executable is built without ROS 2; build it with `cargo build --release --features ros2`",
+    )
 }
 
 pub fn main(arguments: &Arguments) -> Result<ExitCode> {

@@ -25,9 +25,11 @@ impl MapError {
     }
 
     pub fn too_many_boxes(file: &Path) -> Self {
-        let problem = format!(
-            "its walls need more than {MOST_BOXES} boxes; give a map with larger cells or straighter walls"
-        );
-        Self::of(file, problem)
+        Self::of(
+            file,
+            format!(
+                "its walls need more than {MOST_BOXES} boxes; give a map with larger cells or straighter walls"
+            ),
+        )
     }
 }

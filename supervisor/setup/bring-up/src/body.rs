@@ -83,8 +83,7 @@ impl Moves {
         let all: Vec<_> = possible.iter().map(|it| words(it.transpose(), MOTOR)).collect();
         let which = if all.len() > 1 { ": check which way the robot turns and drives" } else { "" };
         let told = if self.exchanged { "the body turns on a command to drive: " } else { "" };
-        let text = format!("{told}{}{which}", all.join("; or "));
-        let mut finding = Finding::wrong("motors", text);
+        let mut finding = Finding::wrong("motors", format!("{told}{}{which}", all.join("; or ")));
         if let [motors] = possible[..]
             && alike
             && mission.robot.protocol() == Protocol::X80
@@ -94,12 +93,12 @@ impl Moves {
                 let goes_as = stated[usize::from(motors[(row, 0)] == 0.0)];
                 let reversed = goes_as.reversed != (motors.row(row).sum() < 0.0);
                 if goes_as.channel != stated[row].channel {
-                    let key = format!("robot.{side}.channel");
-                    finding = finding.with_key(key, goes_as.channel.to_string());
+                    finding = finding
+                        .with_key(format!("robot.{side}.channel"), goes_as.channel.to_string());
                 }
                 if reversed != stated[row].reversed {
-                    let key = format!("robot.{side}.reversed");
-                    finding = finding.with_key(key, reversed.to_string());
+                    finding =
+                        finding.with_key(format!("robot.{side}.reversed"), reversed.to_string());
                 }
             }
         }

@@ -78,8 +78,10 @@ impl Finding {
 pub fn findings(mission: &Mission, trace: &Trace, lifted: bool) -> (Vec<Finding>, Vec<DVec2>) {
     let mut found = vec![wheels::rate(mission, trace)];
     if !trace.begins_at_rest() {
-        let text = "the recording began too late; repeat this on a machine with less load";
-        found.push(Finding::unknown("recording", text));
+        found.push(Finding::unknown(
+            "recording",
+            "the recording began too late; repeat this on a machine with less load",
+        ));
         return (found, Vec::new());
     }
     let wheels = wheels::Wheels::of(trace);

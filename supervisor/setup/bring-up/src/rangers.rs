@@ -76,8 +76,10 @@ pub(crate) fn liveliness(mission: &Mission, trace: &Trace, turned: bool) -> Vec<
             |it: &RangeReading| !matches!(it.status(), RangeStatus::Absent | RangeStatus::Invalid);
         let said = readings(trace, row).filter(|(_, it)| valid(it)).count() as f64;
         if said * (sensor.every_ticks as f64) < LIVES * ticks {
-            let text = "it reports nothing in most ticks; check its plug, its name and its row";
-            return Finding::wrong(name, text);
+            return Finding::wrong(
+                name,
+                "it reports nothing in most ticks; check its plug, its name and its row",
+            );
         }
         let seen_by_others = || {
             let mut others = table.iter().enumerate();
@@ -87,12 +89,16 @@ pub(crate) fn liveliness(mission: &Mission, trace: &Trace, turned: bool) -> Vec<
             })
         };
         if sees(row) == 0 && turned && sensor.kind == SensorKind::Cone && seen_by_others() {
-            let text = "it sees nothing all around, although others do; check its plug, its pin and its transmitter";
-            return Finding::wrong(name, text);
+            return Finding::wrong(
+                name,
+                "it sees nothing all around, although others do; check its plug, its pin and its transmitter",
+            );
         }
         if sees(row) == 0 {
-            let text = "it sees nothing all around; put something within its reach, or check its transmitter";
-            return Finding::unknown(name, text);
+            return Finding::unknown(
+                name,
+                "it sees nothing all around; put something within its reach, or check its transmitter",
+            );
         }
         let mut ranges: Vec<f64> = readings(trace, row)
             .filter(|(at, _)| *at < until)
@@ -207,13 +213,13 @@ pub(crate) fn findings(
     }
     if placed.is_none() {
         found.extend(match moves.way {
-            Some(way) if (way - 1.0).abs() <= SIZES_TOLD.sizes => {
-                let text = format!(
+            Some(way) if (way - 1.0).abs() <= SIZES_TOLD.sizes => Some(Finding::right(
+                "way",
+                format!(
                     "the front sonar measures {:.0} % of the distance that the wheels count",
                     100.0 * way
-                );
-                Some(Finding::right("way", text))
-            }
+                ),
+            )),
             Some(_) => None,
             None => Some(Finding::unknown(
                 "way",

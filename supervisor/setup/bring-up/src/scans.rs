@@ -367,11 +367,13 @@ pub(crate) fn findings(
     };
     let name = &sensor.name;
     if !placed.is_sure() {
-        let text = format!(
-            "only {:.0} % of its beams agree on a motion; place the robot among walls and objects, and repeat",
-            100.0 * placed.share
-        );
-        return vec![Finding::unknown(name, text)];
+        return vec![Finding::unknown(
+            name,
+            format!(
+                "only {:.0} % of its beams agree on a motion; place the robot among walls and objects, and repeat",
+                100.0 * placed.share
+            ),
+        )];
     }
     let mut found = Vec::new();
     let it = placed.unknowns;
@@ -437,21 +439,25 @@ pub(crate) fn findings(
         found.last_mut().into_iter().for_each(|it| it.keys.push(turned.clone()));
     }
     if it[AGE].abs() > AGE_TOLD_S {
-        let text = format!(
-            "its scans are {:.2} s {} than their stamps; stamp them when they are taken",
-            it[AGE].abs(),
-            if it[AGE] > 0.0 { "older" } else { "younger" }
-        );
-        found.push(Finding::wrong(name, text));
+        found.push(Finding::wrong(
+            name,
+            format!(
+                "its scans are {:.2} s {} than their stamps; stamp them when they are taken",
+                it[AGE].abs(),
+                if it[AGE] > 0.0 { "older" } else { "younger" }
+            ),
+        ));
     }
     found.extend(moves.sizes(mission, SIZES_TOLD));
     if found.is_empty() {
         let count = trace.scans.len();
-        let text = format!(
-            "{:.0} % of the beams of {count} scans agree with wheels and mounting",
-            100.0 * placed.share
-        );
-        found.push(Finding::right(name, text));
+        found.push(Finding::right(
+            name,
+            format!(
+                "{:.0} % of the beams of {count} scans agree with wheels and mounting",
+                100.0 * placed.share
+            ),
+        ));
     }
     found
 }

@@ -80,8 +80,10 @@ impl Wheels {
     /// Returns the finding; `motors` has the wheels behind each command, if observed.
     pub(crate) fn finding(&self, motors: Option<Matrix2<f64>>) -> Finding {
         let Some(counted) = self.counted else {
-            let text = "it moved too briefly, perhaps with something within 0.2 m of its front; see the logs of the run, and give it more room";
-            return Finding::unknown("wheels", text);
+            return Finding::unknown(
+                "wheels",
+                "it moved too briefly, perhaps with something within 0.2 m of its front; see the logs of the run, and give it more room",
+            );
         };
         let [left, right] = [0, 1].map(|row| counted.row(row).amax());
         let follows = self.follows();

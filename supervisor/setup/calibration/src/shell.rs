@@ -40,8 +40,7 @@ impl Drive {
     /// Reads the procedure that the run in `directory` saved in its last tick. A recording may lack
     /// ticks.
     pub fn of_run(directory: &Path) -> Result<Option<Self>, CheckpointError> {
-        let file = run::checkpoint_file(directory, Shell::NAME);
-        Ok(Checkpoint::open(&file, STATE_BYTES)?.1)
+        Ok(Checkpoint::open(&run::checkpoint_file(directory, Shell::NAME), STATE_BYTES)?.1)
     }
 
     fn new(plan: CalibrationPlan, rate_hz: f64) -> Self {

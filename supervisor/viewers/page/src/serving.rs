@@ -48,10 +48,12 @@ impl Page {
     pub fn open(arguments: &Arguments, operator: Operator) -> Result<Self> {
         let address = arguments.listen;
         if !address.ip().is_loopback() {
-            let message = format!(
-                "{address} is not a loopback address, and the page does not encrypt; listen on 127.0.0.1 and use a tunnel, or a proxy with --behind-proxy"
+            return refuse(
+                "not-loopback",
+                format!(
+                    "{address} is not a loopback address, and the page does not encrypt; listen on 127.0.0.1 and use a tunnel, or a proxy with --behind-proxy"
+                ),
             );
-            return refuse("not-loopback", message);
         }
         let listener = TcpListener::bind(address).map_err(|problem| {
             let message =

@@ -66,8 +66,10 @@ pub fn list(arguments: &Arguments) -> Result {
         say(format_args!("no answer from {at} within {} s", PATIENCE.as_secs()));
     }
     if listed.is_empty() {
-        let message = "no machine answers; check that `firsthand remote serve` runs there and that this machine may read";
-        return refuse("no-answer", message);
+        return refuse(
+            "no-answer",
+            "no machine answers; check that `firsthand remote serve` runs there and that this machine may read",
+        );
     }
     let mut table = Table::new(["robot", "at", "state", ">time"]);
     for robot in &listed {

@@ -38,8 +38,10 @@ pub fn listen(
     let endpoints: Vec<_> = endpoints.iter().map(|at| endpoint(at, own.cert.is_some())).collect();
     let secured = endpoints.iter().all(|at| at.starts_with("tls/"));
     if !secured && clients.is_some() {
-        let message = "--clients checks certificates, and tcp has none; give each --listen as tls/ADDRESS:PORT";
-        return refuse("no-tls", message);
+        return refuse(
+            "no-tls",
+            "--clients checks certificates, and tcp has none; give each --listen as tls/ADDRESS:PORT",
+        );
     }
     if !secured {
         say(

@@ -70,14 +70,12 @@ impl Server {
     /// Takes an accepted goal, whose target follows the one numbered `after`.
     pub fn accept(&mut self, (id, point): (Uuid, TargetPoint), after: u64, now_ns: u64) {
         self.abort("a newer goal replaced it");
-        let aim = Aim { point, after, ..Aim::default() };
-        self.goals.accept(id, aim, now_ns);
+        self.goals.accept(id, Aim { point, after, ..Aim::default() }, now_ns);
     }
 
     /// Takes a goal that failed before it began, beside the current one.
     pub fn refuse(&mut self, id: Uuid, why: &Refusal, now_ns: u64) {
-        let aim = Aim { why: why.clone(), ..Aim::default() };
-        self.goals.add(id, Status::Aborted, aim, now_ns);
+        self.goals.add(id, Status::Aborted, Aim { why: why.clone(), ..Aim::default() }, now_ns);
     }
 
     pub fn abort(&mut self, why: &str) {

@@ -395,8 +395,7 @@ impl Bridge<'_> {
         }
         if node.is_known() {
             for (request, id) in server.answerable() {
-                let result = server.result(id).unwrap_or_default();
-                node.reply(0, Call::GetResult, &request, &result);
+                node.reply(0, Call::GetResult, &request, &server.result(id).unwrap_or_default());
             }
         }
         let Some(shown) = &mut self.shown else {

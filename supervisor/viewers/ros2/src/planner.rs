@@ -390,8 +390,7 @@ impl<'a> Server<'a> {
                 .map_err(|_| (Reason::Timeout, "too many goals wait already".to_owned()))
         });
         if let Err(failure) = begun {
-            let outcome = Outcome { at_ns, failure: Some(failure), ..Outcome::default() };
-            self.end(action, id, outcome);
+            self.end(action, id, Outcome { at_ns, failure: Some(failure), ..Outcome::default() });
         }
     }
 

@@ -40,12 +40,16 @@ pub fn main(arguments: &Arguments, followed: Option<&RobotName>) -> Result {
     let frame = frame(&arguments.frame)?;
     let distance_m = arguments.distance.unwrap_or(0.0);
     if !(distance_m > 0.0 || arguments.distance.is_none()) {
-        let message = format!("--distance {distance_m} is not a distance; give metres above 0");
-        return refuse("too-near", message);
+        return refuse(
+            "too-near",
+            format!("--distance {distance_m} is not a distance; give metres above 0"),
+        );
     }
     if followed == Some(robot) {
-        let message = format!("robot {robot} cannot follow itself; name another with --robot");
-        return refuse("follows-itself", message);
+        return refuse(
+            "follows-itself",
+            format!("robot {robot} cannot follow itself; name another with --robot"),
+        );
     }
     let mut signals = Signals::that_end()?;
     operator::follow(robot, distance_m)?;

@@ -45,10 +45,12 @@ impl SummaryFile {
         if free < needed {
             let _ = fs::remove_file(&path);
             let (directory, free, needed) = (directory.display(), free >> 10, needed >> 10);
-            let text = format!(
-                "the disk of {directory} has {free} KiB free of the {needed} KiB that the files of a run need; remove old runs, or give another directory"
+            return refuse(
+                "disk-full",
+                format!(
+                    "the disk of {directory} has {free} KiB free of the {needed} KiB that the files of a run need; remove old runs, or give another directory"
+                ),
             );
-            return refuse("disk-full", text);
         }
         Ok(Self { file, directory: directory.to_path_buf() })
     }

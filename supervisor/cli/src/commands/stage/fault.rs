@@ -38,10 +38,12 @@ pub struct Arguments {
 }
 
 fn real_robot(robot: &RobotName) -> Refused {
-    let message = format!(
-        "robot {robot} is real, and a fault may drive it into obstacles; to inject it anyway, clear its surroundings and add --break-a-real-robot"
-    );
-    Refused::new("real-robot", message)
+    Refused::new(
+        "real-robot",
+        format!(
+            "robot {robot} is real, and a fault may drive it into obstacles; to inject it anyway, clear its surroundings and add --break-a-real-robot"
+        ),
+    )
 }
 
 pub fn main(arguments: &Arguments) -> Result {
@@ -49,8 +51,10 @@ pub fn main(arguments: &Arguments) -> Result {
     let Some(fault) = faults::find(stage, &arguments.fault) else {
         let known: Vec<_> = faults::of(stage).map(|fault| fault.name).collect();
         let (fault, known) = (&arguments.fault, known.join(", "));
-        let message = format!("{stage} has no fault called {fault:?}; it has {known}");
-        return refuse("unknown-fault", message);
+        return refuse(
+            "unknown-fault",
+            format!("{stage} has no fault called {fault:?}; it has {known}"),
+        );
     };
     let robot = &arguments.robot;
     let domain = robot.domain();
@@ -70,16 +74,16 @@ pub fn main(arguments: &Arguments) -> Result {
     let refused = match request_fault(&bus, stage, request)? {
         Some(FaultAnswer::Taken) => return Ok(()),
         Some(FaultAnswer::Refused) => real_robot(robot),
-        Some(FaultAnswer::Impossible) => {
-            let message = format!(
+        Some(FaultAnswer::Impossible) => Refused::new(
+            "not-yet",
+            format!(
                 "{stage} has nothing to break yet; retry when the robot drives (`firsthand status`)"
-            );
-            Refused::new("not-yet", message)
-        }
-        Some(FaultAnswer::None) | None => {
-            let message = format!("{stage} does not answer; is it running? (`firsthand status`)");
-            Refused::new("no-answer", message)
-        }
+            ),
+        ),
+        Some(FaultAnswer::None) | None => Refused::new(
+            "no-answer",
+            format!("{stage} does not answer; is it running? (`firsthand status`)"),
+        ),
     };
     Err(refused.into())
 }

@@ -49,8 +49,10 @@ pub fn run(words: &[OsString]) -> Result {
         let known = super::subcommands();
         let near = known.iter().find(|known| strsim::jaro_winkler(known, &name) > NEAR);
         let near = near.map_or(String::new(), |near| format!("; did you mean `stage {near}`?"));
-        let message = format!("{unknown}; `stage` has no such subcommand either{near}");
-        Refused::new("unknown-stage", message)
+        Refused::new(
+            "unknown-stage",
+            format!("{unknown}; `stage` has no such subcommand either{near}"),
+        )
     })?;
     let start = stage_command::start_with(stage.name, options.iter().cloned())?;
     if let Start::External { robot, .. } = &start {

@@ -68,7 +68,10 @@ pub fn main(arguments: &Arguments) -> Result {
 pub fn readable(name: &str) -> Result<&'static dyn AnyTopic> {
     topics::find(name).ok_or_else(|| {
         let names: Vec<_> = topics::TABLE.iter().map(|topic| topic.spec().name).collect();
-        let message = format!("there is no topic {name:?}; there are {}", names.join(", "));
-        Refused::new("unknown-topic", message).into()
+        Refused::new(
+            "unknown-topic",
+            format!("there is no topic {name:?}; there are {}", names.join(", ")),
+        )
+        .into()
     })
 }

@@ -105,8 +105,10 @@ impl Planner {
             }
             stride += stride.div_ceil(4);
         }
-        let text = format!("the path has more than {most} bends, the limit of one answer");
-        Err((Reason::Unknown, text))
+        Err((
+            Reason::Unknown,
+            format!("the path has more than {most} bends, the limit of one answer"),
+        ))
     }
 
     /// Returns poses at most `stride` apart, closer beside blocked cells.
@@ -159,8 +161,10 @@ impl Planner {
             return Err((Reason::StartOccupied, format!("the start {start} is occupied")));
         }
         if self.blocked[last.row * map.width + last.col] {
-            let text = format!("the goal {goal} is occupied, or the robot does not fit there");
-            return Err((Reason::GoalOccupied, text));
+            return Err((
+                Reason::GoalOccupied,
+                format!("the goal {goal} is occupied, or the robot does not fit there"),
+            ));
         }
         let body = self.body;
         let field = self.field(map, last, cancellation).map_err(|error| match error {
