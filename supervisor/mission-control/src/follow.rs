@@ -51,9 +51,10 @@ impl Supervisor<'_> {
     }
 
     pub(crate) fn end_follow(&mut self) -> RequestAnswer {
-        match self.end_following(TargetOutcome::Followed) {
-            true => RequestAnswer::Taken,
-            false => RequestAnswer::NotFollowing,
+        if self.end_following(TargetOutcome::Followed) {
+            RequestAnswer::Taken
+        } else {
+            RequestAnswer::NotFollowing
         }
     }
 

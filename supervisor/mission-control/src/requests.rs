@@ -152,9 +152,10 @@ impl Supervisor<'_> {
         }
         let points = points.unwrap_or_default();
         if appends && self.targets.has_target() {
-            return match self.targets.append(points) {
-                true => RequestAnswer::Taken,
-                false => RequestAnswer::TooMany,
+            return if self.targets.append(points) {
+                RequestAnswer::Taken
+            } else {
+                RequestAnswer::TooMany
             };
         }
         self.replace_targets(points);
@@ -263,11 +264,8 @@ impl Supervisor<'_> {
         if stamp.seconds() >= self.deadline().at_s() {
             return false;
         }
-        let since_tick = match self.clock.in_ticks() {
-            // In lockstep no tick follows an arrival.
-            true => stamp.tick + 1,
-            false => self.first_tick(),
-        };
+        // In lockstep no tick follows an arrival.
+        let since_tick = if self.clock.in_ticks() { stamp.tick + 1 } else { self.first_tick() };
         self.targets.advance(arrival, since_tick);
         self.on_new_target();
         self.log_target();

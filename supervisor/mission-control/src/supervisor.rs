@@ -357,17 +357,19 @@ impl<'a> Supervisor<'a> {
     /// Returns the mission time. In lockstep it is the newest pose's, because the ground truth comes
     /// when its process is scheduled.
     pub(crate) fn pose_time(&self) -> MissionTime {
-        match self.clock.in_ticks() {
-            true => self.clock.pose_time(self.record.pose.as_ref()),
-            false => self.mission_time(),
+        if self.clock.in_ticks() {
+            self.clock.pose_time(self.record.pose.as_ref())
+        } else {
+            self.mission_time()
         }
     }
 
     /// Returns the current target's deadline; infinite while waiting or following.
     pub(crate) const fn deadline(&self) -> Deadline {
-        let timeout_s = match self.targets.waits || self.targets.follows {
-            true => f64::INFINITY,
-            false => self.options.mission.timeout_s,
+        let timeout_s = if self.targets.waits || self.targets.follows {
+            f64::INFINITY
+        } else {
+            self.options.mission.timeout_s
         };
         Deadline {
             began_s: self.targets.began_s,

@@ -110,10 +110,14 @@ fn kinds(map: &FieldOnMap<'_>) -> Vec<Kind> {
     map.blocked
         .iter()
         .zip(map.cells)
-        .map(|(&blocked, cell)| match blocked {
-            true => Kind::Blocked,
-            false if cell.log2_u.is_finite() => Kind::Reachable,
-            false => Kind::CutOff,
+        .map(|(&blocked, cell)| {
+            if blocked {
+                Kind::Blocked
+            } else if cell.log2_u.is_finite() {
+                Kind::Reachable
+            } else {
+                Kind::CutOff
+            }
         })
         .collect()
 }

@@ -135,9 +135,10 @@ impl Moves {
         let track = self.turn.map(|turn| other.unwrap_or(1.0) / turn);
         if let Some(track) = track.filter(is_told) {
             let text = format!("the body turns {:.0} % of the angle that {said}", 100.0 / track);
-            let (key, stated) = match is_own {
-                true => ("robot.odometry.track_scale", odometry.track_scale),
-                false => ("robot.track_m", body.track_m),
+            let (key, stated) = if is_own {
+                ("robot.odometry.track_scale", odometry.track_scale)
+            } else {
+                ("robot.track_m", body.track_m)
             };
             let finding = Finding::wrong("track", text);
             found.push(finding.with_key(key, format!("{:.3}", stated * track)));

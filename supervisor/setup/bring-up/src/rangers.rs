@@ -110,14 +110,15 @@ pub(crate) fn liveliness(mission: &Mission, trace: &Trace, turned: bool) -> Vec<
             0..4 => 0.0,
             many => (ranges[3 * many / 4] - ranges[many / 4]) / 1.35,
         };
-        match noise > NOISE_M {
-            true => Finding::wrong(
+        if noise > NOISE_M {
+            Finding::wrong(
                 name,
                 format!(
                     "its ranges vary by {noise:.2} m although the robot stands; check its supply and its mounting"
                 ),
-            ),
-            false => Finding::right(name, format!("it works; noise at rest {noise:.3} m")),
+            )
+        } else {
+            Finding::right(name, format!("it works; noise at rest {noise:.3} m"))
         }
     };
     table.iter().enumerate().map(finding).collect()
@@ -139,11 +140,10 @@ fn laser_lives(trace: &Trace, row: usize, sensor: &Sensor) -> Finding {
     let share = ended as f64 / beams.max(1) as f64;
     let text =
         format!("{hz:.1} scans per second, {:.0} % of the beams hit something", 100.0 * share);
-    match share > 0.1 {
-        true => Finding::right(name, text),
-        false => {
-            Finding::wrong(name, format!("{text}; put something around it, and clean its window"))
-        }
+    if share > 0.1 {
+        Finding::right(name, text)
+    } else {
+        Finding::wrong(name, format!("{text}; put something around it, and clean its window"))
     }
 }
 

@@ -28,9 +28,10 @@ pub(crate) fn rate(mission: &Mission, trace: &Trace) -> Finding {
     };
     let hz = (trace.rolled.len() - 1) as f64 / (last.0 - first.0).max(1e-3);
     let text = format!("it reports its wheels {hz:.1} times per second, {stated:.1} stated");
-    match (hz / stated - 1.0).abs() <= RATE_SHARE {
-        true => Finding::right("robot", text),
-        false => Finding::wrong("robot", text).with_key("robot.rate_hz", format!("{hz:.0}")),
+    if (hz / stated - 1.0).abs() <= RATE_SHARE {
+        Finding::right("robot", text)
+    } else {
+        Finding::wrong("robot", text).with_key("robot.rate_hz", format!("{hz:.0}"))
     }
 }
 

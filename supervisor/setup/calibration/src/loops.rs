@@ -245,9 +245,10 @@ impl Estimate {
     /// # Errors
     /// Fails if they exceed what the noise explains.
     pub(crate) fn unless_scattered(self) -> Result<Self, Refusal> {
-        match self.chi2_per_dof > MOST_CHI2 {
-            true => Err(Refusal::Scattered { chi2_per_dof: self.chi2_per_dof }),
-            false => Ok(self),
+        if self.chi2_per_dof > MOST_CHI2 {
+            Err(Refusal::Scattered { chi2_per_dof: self.chi2_per_dof })
+        } else {
+            Ok(self)
         }
     }
 

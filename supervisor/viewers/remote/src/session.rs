@@ -134,8 +134,5 @@ pub fn endpoint(at: &str, secured: bool) -> String {
     let (protocol, address) =
         at.split_once('/').unwrap_or((if secured { "tls" } else { "tcp" }, at));
     let has_port = address.rsplit_once(':').is_some_and(|(_, port)| port.parse::<u16>().is_ok());
-    match has_port {
-        true => format!("{protocol}/{address}"),
-        false => format!("{protocol}/{address}:{PORT}"),
-    }
+    if has_port { format!("{protocol}/{address}") } else { format!("{protocol}/{address}:{PORT}") }
 }

@@ -256,9 +256,10 @@ impl Mirror {
             self.refuse(topic);
             return Ok(());
         };
-        let message = match known.spec().name == topics::ROSTER.spec().name {
-            true => without_processes(message),
-            false => Some(message.to_vec()),
+        let message = if known.spec().name == topics::ROSTER.spec().name {
+            without_processes(message)
+        } else {
+            Some(message.to_vec())
         };
         let writer = self.writer(known)?;
         let Some(message) = message.filter(|it| writer.publish_message(it).unwrap_or(false)) else {

@@ -45,8 +45,9 @@ pub fn place(payload: &[u8]) -> Result<(TargetPoint, [f64; 2]), String> {
 pub fn stick(payload: &[u8], mission: &Mission) -> Result<DVec2, String> {
     let Twist { linear, angular } = Twist::decode(payload)?;
     let stick = DVec2::new(linear.x / mission.speed_m_s(), angular.z / mission.turn_rad_s());
-    match stick.is_finite() {
-        true => Ok(stick.clamp(DVec2::NEG_ONE, DVec2::ONE)),
-        false => Err("a speed is not finite; give m/s and rad/s".to_owned()),
+    if stick.is_finite() {
+        Ok(stick.clamp(DVec2::NEG_ONE, DVec2::ONE))
+    } else {
+        Err("a speed is not finite; give m/s and rad/s".to_owned())
     }
 }

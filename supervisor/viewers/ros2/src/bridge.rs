@@ -295,9 +295,10 @@ impl Bridge<'_> {
                     self.orders.give(Order::Hand(stick, Instant::now()));
                 }
             }
-            Id::Stop => self.orders.give(match Bool::decode(&message.payload)?.data {
-                true => Order::Stand { is_cancel: false },
-                false => Order::Resume,
+            Id::Stop => self.orders.give(if Bool::decode(&message.payload)?.data {
+                Order::Stand { is_cancel: false }
+            } else {
+                Order::Resume
             }),
             Id::Tf => self.transforms.take(&message.payload, Some(Instant::now()))?,
             _ => {}

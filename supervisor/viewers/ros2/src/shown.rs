@@ -306,9 +306,10 @@ impl Shown {
         let mut statuses = vec![self.status(level, "failsafe", message, values)];
         statuses.extend(self.state.stages.iter().map(|entry| self.stage(entry)));
         if let Some(power) = &self.state.power {
-            let (level, message) = match power.is_low() {
-                true => (DiagnosticStatus::WARN, "low"),
-                false => (DiagnosticStatus::OK, "not low"),
+            let (level, message) = if power.is_low() {
+                (DiagnosticStatus::WARN, "low")
+            } else {
+                (DiagnosticStatus::OK, "not low")
             };
             let volts = |volts: f64| format!("{volts:.2}");
             let values =

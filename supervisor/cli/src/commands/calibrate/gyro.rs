@@ -70,10 +70,10 @@ fn motions(
     }
     motions.push(motion);
     motions.retain(|motion| motion.rolled_m > 0.0);
-    match silent > 0 {
-        true => Err(format!(
+    if silent > 0 {
+        return Err(format!(
             "the gyro reports nothing in {silent} of {ticks} ticks; check it with `firsthand bring-up`, or repeat this on a machine with less load"
-        )),
-        false => Ok((at_rest, motions)),
+        ));
     }
+    Ok((at_rest, motions))
 }

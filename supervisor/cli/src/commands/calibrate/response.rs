@@ -20,9 +20,10 @@ pub fn measure(arguments: &Arguments, mission: &Mission) -> Result {
     let [told, turned] =
         [&trace.told, &trace.rolled].map(|it| it.iter().map(turn).collect::<Vec<_>>());
     let found = estimate(&told, &turned, &body, By::Turns).map_err(refused)?;
-    match arguments.setting.json {
-        true => print_line(as_json(&found)),
-        false => print_text(keys(&found, body.response)),
+    if arguments.setting.json {
+        print_line(as_json(&found))
+    } else {
+        print_text(keys(&found, body.response))
     }
 }
 
