@@ -114,7 +114,7 @@ impl Surroundings for Real<'_> {
     }
 
     fn host(&self, options: &Options) -> Box<dyn Host> {
-        Box::new(System::new(options.directory.clone()))
+        Box::new(System { directory: options.directory.clone() })
     }
 
     fn start_robot(&mut self, options: &Options) -> Result<Robot> {

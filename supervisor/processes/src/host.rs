@@ -62,14 +62,10 @@ pub trait Host {
 
 /// The system. Stages log to the run directory.
 pub struct System {
-    directory: PathBuf,
+    pub directory: PathBuf,
 }
 
 impl System {
-    pub const fn new(directory: PathBuf) -> Self {
-        Self { directory }
-    }
-
     fn log(&self, stage: &str) -> PathBuf {
         self.directory.join(format!("{stage}.log"))
     }

@@ -163,14 +163,15 @@ impl Policy {
         let dies_often = self.deaths.max(self.recent.len()) >= HOLD_AFTER;
         assert!(dies_often || self.phase != Phase::Held);
         match (self.phase, event) {
-            (Phase::Down | Phase::BackingOff { .. }, Event::Start) => Some(self.start(now)),
-            (Phase::BackingOff { .. }, Event::Time(_)) if due => Some(self.start(now)),
+            (Phase::Down | Phase::BackingOff { .. }, Event::Start)
+            | (Phase::Replaced { .. }, Event::Exited | Event::Refused) => self.start(now),
+            (Phase::BackingOff { .. }, Event::Time(_)) if due => self.start(now),
             (Phase::Held, Event::Start)
             | (Phase::BackingOff { .. } | Phase::Held, Event::Replace) => {
                 self.deaths = 0;
                 self.blocked_starts = 0;
                 self.recent.clear();
-                Some(self.start(now))
+                self.start(now)
             }
             (Phase::Starting { .. }, Event::StartFailed) => {
                 // A resource is used up, so the next start waits.
@@ -243,7 +244,6 @@ impl Policy {
             (Phase::Aborted { stability, .. }, Event::Exited | Event::Refused) => {
                 self.record_death(stability, now)
             }
-            (Phase::Replaced { .. }, Event::Exited | Event::Refused) => Some(self.start(now)),
             (Phase::Stopping { .. }, Event::Exited | Event::Refused)
             | (Phase::BackingOff { .. } | Phase::Held, Event::Stop) => {
                 self.phase = Phase::Down;
@@ -253,9 +253,9 @@ impl Policy {
         }
     }
 
-    const fn start(&mut self, now: Now) -> Action {
+    const fn start(&mut self, now: Now) -> Option<Action> {
         self.phase = Phase::Starting { since: now };
-        Action::Start
+        Some(Action::Start)
     }
 
     fn abort(&mut self, stability: Stability, now: Now) -> Option<Action> {
@@ -304,7 +304,7 @@ impl Policy {
             return None;
         }
         if self.deaths == 1 {
-            return Some(self.start(now));
+            return self.start(now);
         }
         assert!((2..HOLD_AFTER).contains(&self.deaths));
         let doublings = (self.deaths - 2).min(10) as u32;

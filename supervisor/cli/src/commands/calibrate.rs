@@ -6,7 +6,7 @@ mod written;
 
 use std::{fmt::Display, path::PathBuf};
 
-use calibration::{loops, shell::Drive, squares, wall::State};
+use calibration::{loops, shell::Drive, squares};
 use clap::Args;
 use common::{
     mission::{CalibrationPlan, Mission, Procedure, SensorKind},
@@ -135,8 +135,10 @@ impl Arguments {
 }
 
 fn share(text: &str) -> std::result::Result<f64, String> {
-    let share = text.parse().ok().filter(|share| (0.0..=0.1).contains(share));
-    share.ok_or_else(|| "give a share from 0 to 0.1: 0.01 is 1 %".to_owned())
+    text.parse()
+        .ok()
+        .filter(|share| (0.0..=0.1).contains(share))
+        .ok_or_else(|| "give a share from 0 to 0.1: 0.01 is 1 %".to_owned())
 }
 
 fn refused(message: impl Display) -> Failure {
@@ -151,15 +153,11 @@ fn by_wall(arguments: &Arguments, mission: &Mission) -> Result<Found> {
             "the planner of the run in {place} saved nothing; repeat the calibration"
         )));
     };
-    match wall.state() {
-        State::Finished => {}
-        State::Failed(fault) => return Err(refused(fault)),
-        State::Running => {
-            return Err(refused(format_args!(
-                "the run in {place} ended too early; repeat the calibration"
-            )));
-        }
-    }
+    wall.ended()
+        .ok_or_else(|| {
+            refused(format_args!("the run in {place} ended too early; repeat the calibration"))
+        })?
+        .map_err(refused)?;
     let estimate =
         loops::checked(&wall.loops, wall.normal_sd(), mission.body().track_m).map_err(refused)?;
     Ok(Found { method: "wall", estimate, metres: wall.metres(), seconds })

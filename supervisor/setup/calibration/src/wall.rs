@@ -115,13 +115,6 @@ pub struct Order {
     pub heading_rad: f64,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum State {
-    Running,
-    Finished,
-    Failed(Fault),
-}
-
 pub(crate) fn echo_m(reading: &RangeReading) -> Option<f64> {
     match reading.status() {
         RangeStatus::Measured => Some(reading.range_m),
@@ -149,11 +142,11 @@ impl Wall {
         self.ways.rolled_m / 2.0
     }
 
-    pub const fn state(&self) -> State {
+    pub const fn ended(&self) -> Option<Result<(), Fault>> {
         match self.phase {
-            Phase::Finished => State::Finished,
-            Phase::Failed(fault) => State::Failed(fault),
-            _ => State::Running,
+            Phase::Finished => Some(Ok(())),
+            Phase::Failed(fault) => Some(Err(fault)),
+            _ => None,
         }
     }
 
