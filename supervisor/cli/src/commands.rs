@@ -184,8 +184,13 @@ fn listed() -> String {
             let Some(command) = all.get_subcommands().find(is_it) else { continue };
             let (name, about) = (command.get_name(), command.get_about());
             let about = about.map(ToString::to_string).unwrap_or_default();
-            let about = about.split([';', ':']).next().unwrap_or_default();
-            let about = about.split(". ").next().unwrap_or_default();
+            let about = about
+                .split([';', ':'])
+                .next()
+                .unwrap_or_default()
+                .split(". ")
+                .next()
+                .unwrap_or_default();
             text += &format!("  {name:<12} {about}\n");
         }
         text.push('\n');

@@ -48,15 +48,13 @@ impl ProgressLine {
 
 /// Returns 0 if the width is unknown.
 fn columns() -> usize {
-    let size = rustix::termios::tcgetwinsize(io::stderr());
-    size.map_or(0, |size| size.ws_col.into())
+    rustix::termios::tcgetwinsize(io::stderr()).map_or(0, |size| size.ws_col.into())
 }
 
 /// Cuts a line before the last column, because a wrapped line cannot be rewritten; 0: no limit.
 fn cut(line: &str, columns: usize) -> &str {
     let shown = columns.checked_sub(1).unwrap_or(usize::MAX);
-    let end = line.char_indices().nth(shown);
-    end.map_or(line, |(end, _)| &line[..end])
+    line.char_indices().nth(shown).map_or(line, |(end, _)| &line[..end])
 }
 
 #[cfg(test)]

@@ -30,8 +30,10 @@ impl Robot {
 /// files of the latter remain until their next run.
 pub fn own() -> (Vec<Robot>, Vec<Robot>) {
     // All robots of a user share one directory.
-    let any = "any".parse().ok().map(Domain::of);
-    let mut names: Vec<_> = any
+    let mut names: Vec<_> = "any"
+        .parse()
+        .ok()
+        .map(Domain::of)
         .as_ref()
         .and_then(|any| any.directory().parent())
         .into_iter()

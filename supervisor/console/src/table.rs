@@ -25,11 +25,15 @@ impl<const N: usize> Display for Table<N> {
             self.rows.iter().map(|row| row[column].chars().count()).max().unwrap_or_default()
         });
         for row in &self.rows {
-            let cells = row.iter().zip(widths).zip(self.to_the_right);
-            let cells = cells.map(|((cell, width), to_the_right)| {
-                if to_the_right { format!("{cell:>width$}") } else { format!("{cell:<width$}") }
-            });
-            writeln!(to, "{}", cells.collect::<Vec<_>>().join("  ").trim_end())?;
+            let cells: Vec<_> = row
+                .iter()
+                .zip(widths)
+                .zip(self.to_the_right)
+                .map(|((cell, width), to_the_right)| {
+                    if to_the_right { format!("{cell:>width$}") } else { format!("{cell:<width$}") }
+                })
+                .collect();
+            writeln!(to, "{}", cells.join("  ").trim_end())?;
         }
         Ok(())
     }

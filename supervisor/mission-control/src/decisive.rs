@@ -63,8 +63,8 @@ pub(crate) fn first(
         return undecided(ending);
     }
     let poses = &record.poses;
-    let contact = first_contact(truth, mission);
-    let contact = contact.map(|contact| (tick_of(contact, poses), touched([contact.x, contact.y])));
+    let contact = first_contact(truth, mission)
+        .map(|contact| (tick_of(contact, poses), touched([contact.x, contact.y])));
     let arrival = record.arrival.map(|it| {
         let beside = record.beside(&it, mission.arrival_tolerance_m);
         (it.stamp.tick, arrived(it.distance_m, beside))

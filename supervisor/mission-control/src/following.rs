@@ -262,8 +262,7 @@ impl Around<'_> {
 
     /// Returns the nearest free cell; the robot may stand in a hazard's margin.
     fn start(&self, from: DVec2) -> Option<Cell> {
-        let own = self.frame.cell_at(from).filter(|cell| self.is_free_cell(*cell));
-        own.or_else(|| {
+        self.frame.cell_at(from).filter(|cell| self.is_free_cell(*cell)).or_else(|| {
             let free = self.frame.whole().cells().filter(|cell| self.is_free_cell(*cell));
             let off = |cell: &Cell| self.frame.centre_of(*cell).distance_squared(from);
             free.min_by(|one, other| off(one).total_cmp(&off(other)))

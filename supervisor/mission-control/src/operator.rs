@@ -205,12 +205,12 @@ pub fn sign_off(robot: &RobotName) -> Result {
 /// Tells the link to stop the robot. Returns `None` if no link answers, which then sends no
 /// commands either.
 fn told_link(domain: &Domain) -> Result<Option<Operator>> {
-    let link = Operator::connect(&domain.stop_socket());
-    let link = link.map_err(system("open a socket to the link"))?;
-    Ok(link.filter(|link| {
-        let answer = link.send(Request::Stop).and_then(|()| link.answer(LINK_ANSWERS));
-        matches!(answer, Ok(Some(_)))
-    }))
+    Ok(Operator::connect(&domain.stop_socket())
+        .map_err(system("open a socket to the link"))?
+        .filter(|link| {
+            let answer = link.send(Request::Stop).and_then(|()| link.answer(LINK_ANSWERS));
+            matches!(answer, Ok(Some(_)))
+        }))
 }
 
 /// Waits until the robot rests, as `link` sees it, or as whoever follows a link that dies: the next

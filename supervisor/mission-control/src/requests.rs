@@ -117,8 +117,8 @@ impl Supervisor<'_> {
     fn change_zones(&mut self, request: &RequestSample, adds: bool) -> RequestAnswer {
         const { assert!(MOST_TARGETS <= MOST_CORNERS) };
         let mission = &self.options.mission;
-        let points = request.targets().unwrap_or_default().iter();
-        let points: Vec<_> = points.map(TargetPoint::position).collect();
+        let points: Vec<_> =
+            request.targets().unwrap_or_default().iter().map(TargetPoint::position).collect();
         if !points.iter().all(|point| point.is_finite()) {
             return RequestAnswer::Malformed;
         }

@@ -82,8 +82,10 @@ impl RunClock {
             .first()
             .filter(|pose| pose.stamp.tick == 0)
             .map_or(MissionTime::default(), |pose| pose.stamp.time());
-        let last = last_tick.or(record.newest_tick()).and_then(pose_at);
-        last.map_or(0.0, |last| last.since(first).as_secs_f64())
+        last_tick
+            .or(record.newest_tick())
+            .and_then(pose_at)
+            .map_or(0.0, |last| last.since(first).as_secs_f64())
     }
 
     /// `truth` is the newest ground truth.

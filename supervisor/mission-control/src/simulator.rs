@@ -100,10 +100,9 @@ impl Simulator {
             .take_stdout()
             .ok_or_else(|| SimulatorError::Startup("it has no output".into()))?;
         ioctl_fionbio(&pipe, true).map_err(|errno| system("listen to")(errno.into()))?;
-        let file = append(directory.join(GROUND_TRUTH));
         let mut truth = GroundTruth {
             pipe,
-            file: file.ok(),
+            file: append(directory.join(GROUND_TRUTH)).ok(),
             unfinished: Vec::new(),
             listening: None,
             ticks: Vec::new(),

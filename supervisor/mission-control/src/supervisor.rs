@@ -449,11 +449,10 @@ impl<'a> Supervisor<'a> {
         let mut descriptors = self.stages.descriptors();
         descriptors.extend(self.robot.simulator.as_ref().and_then(|it| it.descriptor()));
         let hand = self.hand_until.map(|until| until.saturating_duration_since(Instant::now()));
-        let soonest = [self.stages.time_to_deadline(), self.service.time_to_feed(), hand]
+        let timeout = [self.stages.time_to_deadline(), self.service.time_to_feed(), hand]
             .into_iter()
             .flatten()
-            .min();
-        let timeout = soonest.map_or(topics::RESTATE, |soonest| soonest.min(topics::RESTATE));
+            .fold(topics::RESTATE, Ord::min);
         self.bus.waiter.wait_also_for(&descriptors, timeout)?;
         self.stages.on_waited(timeout);
         Ok(())

@@ -279,8 +279,13 @@ impl TargetList {
     /// Returns the results to record now, in order. If there `is_truth`, arrivals wait for it.
     pub(crate) fn take_known(&mut self, is_truth: bool) -> Vec<TargetResult> {
         let is_known = |it: &&Stored| !is_truth || it.tick.is_none() || it.result.truth_m.is_some();
-        let known = self.results.iter().skip(self.recorded).take_while(is_known);
-        let known: Vec<_> = known.map(|stored| stored.result).collect();
+        let known: Vec<_> = self
+            .results
+            .iter()
+            .skip(self.recorded)
+            .take_while(is_known)
+            .map(|stored| stored.result)
+            .collect();
         self.recorded += known.len();
         known
     }

@@ -209,8 +209,7 @@ fn claim(domain: &Domain) -> Result<Option<Claim>, DomainError> {
 
 fn make_directory(domain: &Domain) -> Result<(), DomainError> {
     let directory = domain.directory();
-    let mut both = directory.parent().into_iter().chain([directory]);
-    both.try_for_each(make_own_directory)
+    directory.parent().into_iter().chain([directory]).try_for_each(make_own_directory)
 }
 
 /// Makes a directory for its owner only, in a place that other users can write.

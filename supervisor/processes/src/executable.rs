@@ -10,8 +10,8 @@ pub fn find(named: &Path) -> io::Result<PathBuf> {
     let has_slash = named.as_os_str().as_encoded_bytes().contains(&b'/');
     let is_name = named.components().count() == 1 && !has_slash;
     let found = if is_name {
-        let mut found = folders().map(|folder| folder.join(named));
-        found
+        folders()
+            .map(|folder| folder.join(named))
             .find(|candidate| check(candidate).is_ok())
             .ok_or_else(|| io::Error::other("it is neither beside firsthand nor on PATH"))?
     } else {
@@ -26,10 +26,10 @@ pub fn find(named: &Path) -> io::Result<PathBuf> {
 }
 
 fn folders() -> impl Iterator<Item = PathBuf> {
-    let own = env::current_exe().ok();
-    let beside = own.and_then(|own| Some(own.parent()?.to_path_buf()));
-    let path = env::var_os("PATH").unwrap_or_default();
-    let path: Vec<_> = env::split_paths(&path).filter(|folder| folder.is_absolute()).collect();
+    let beside = env::current_exe().ok().and_then(|own| Some(own.parent()?.to_path_buf()));
+    let path: Vec<_> = env::split_paths(&env::var_os("PATH").unwrap_or_default())
+        .filter(|folder| folder.is_absolute())
+        .collect();
     beside.into_iter().chain(path)
 }
 

@@ -94,8 +94,9 @@ fn end_children(signal: Signal) {
     };
     for thread in threads.flatten() {
         let children = fs::read_to_string(thread.path().join("children")).unwrap_or_default();
-        let pids = children.split_ascii_whitespace();
-        for pid in pids.filter_map(|pid| Pid::from_raw(pid.parse().ok()?)) {
+        for pid in
+            children.split_ascii_whitespace().filter_map(|pid| Pid::from_raw(pid.parse().ok()?))
+        {
             let _ = kill_process(pid, signal);
         }
     }

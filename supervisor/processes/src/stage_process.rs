@@ -129,13 +129,13 @@ impl StageProcess {
         assert!(self.process.is_none());
         let stage = self.stage.name;
         (self.started, self.hung, self.times) = (now, None, Some(Times::default()));
-        let number = run::next_generation(directory, stage).map_err(io::Error::other);
-        let spawned = number.and_then(|number| {
-            self.generation = number;
-            let directory = directory.to_path_buf();
-            let generation = Generation { stage, directory, number, first_tick };
-            host.start(self.executable.as_deref(), &generation)
-        });
+        let spawned =
+            run::next_generation(directory, stage).map_err(io::Error::other).and_then(|number| {
+                self.generation = number;
+                let directory = directory.to_path_buf();
+                let generation = Generation { stage, directory, number, first_tick };
+                host.start(self.executable.as_deref(), &generation)
+            });
         match spawned {
             Ok(process) => self.process = Some(process),
             // The start is retried with growing pauses; other stages go on.

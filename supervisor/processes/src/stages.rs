@@ -129,8 +129,7 @@ pub fn find(name: &str) -> Option<&'static Stage> {
 }
 
 pub fn unknown(name: &str) -> String {
-    let names: Vec<_> = TABLE.iter().map(|stage| stage.name).collect();
-    let names = names.join(", ");
+    let names = TABLE.iter().map(|stage| stage.name).collect::<Vec<_>>().join(", ");
     format!("no stage is called {name:?}; the stages are {names}")
 }
 

@@ -44,8 +44,7 @@ pub(crate) struct RecordingFile {
 }
 
 pub fn now_ns() -> u64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    since.map_or(0, |since| since.as_nanos() as u64)
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos() as u64)
 }
 
 impl RecordingFile {
@@ -160,15 +159,16 @@ pub(crate) struct Output {
 impl Output {
     pub(crate) fn create(path: &Path, profile: &str) -> Result<Self> {
         let file = File::create(path).map_err(FileError::of("make", path))?;
-        let options = WriteOptions::new()
+        let writer = WriteOptions::new()
             .profile(profile)
             .library(concat!("firsthand ", env!("CARGO_PKG_VERSION")))
             .compression(Some(Compression::Zstd))
             .compression_threads(0)
             .chunk_size(Some(CHUNK_BYTES))
             // A complete chunk is written at once and never changed.
-            .disable_seeking(true);
-        let writer = options.create(BufWriter::new(file)).map_err(failed(path))?;
+            .disable_seeking(true)
+            .create(BufWriter::new(file))
+            .map_err(failed(path))?;
         Ok(Self { writer, path: path.to_path_buf(), channels: HashMap::new() })
     }
 
@@ -183,9 +183,10 @@ impl Output {
     ) -> Result {
         let failed = failed(&self.path);
         let about = about.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
-        let schema = self.writer.add_schema(schema, language, text);
-        let added =
-            schema.and_then(|schema| self.writer.add_channel(schema, topic, encoding, &about));
+        let added = self
+            .writer
+            .add_schema(schema, language, text)
+            .and_then(|schema| self.writer.add_channel(schema, topic, encoding, &about));
         self.channels.insert(topic.to_owned(), added.map_err(failed)?);
         Ok(())
     }

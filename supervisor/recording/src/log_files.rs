@@ -21,8 +21,9 @@ impl Tail {
     /// Returns the new whole lines of `file`, at most 64 KiB at once.
     pub fn lines(&mut self, file: &Path) -> String {
         let mut bytes = vec![0; AT_ONCE];
-        let read = File::open(file).and_then(|file| file.read_at(&mut bytes, self.read));
-        let length = read.unwrap_or_default();
+        let length = File::open(file)
+            .and_then(|file| file.read_at(&mut bytes, self.read))
+            .unwrap_or_default();
         self.read += length as u64;
         self.partial.extend_from_slice(&bytes[..length]);
         let whole = self.partial.iter().rposition(|&byte| byte == b'\n').map_or(0, |at| at + 1);

@@ -370,8 +370,7 @@ impl CurrentRun {
         }
         self.logs_taken = Instant::now();
         let now_ns = self.file.now_ns();
-        let mut lines = self.logs.take().into_iter();
-        lines.try_for_each(|(process, line)| {
+        self.logs.take().into_iter().try_for_each(|(process, line)| {
             self.file.message(viewers::LOG, now_ns, &viewers::log(&process, &line, now_ns))
         })
     }

@@ -29,8 +29,7 @@ static OWN: LazyLock<BTreeMap<String, String>> = LazyLock::new(|| {
 
 /// Returns whether a recorded schema has the name of a known one and other fields.
 pub(crate) fn differs(name: &str, text: &[u8]) -> bool {
-    let own = OWN.get(name);
-    own.is_some_and(|own| uncommented(&String::from_utf8_lossy(text)) != *own)
+    OWN.get(name).is_some_and(|own| uncommented(&String::from_utf8_lossy(text)) != *own)
 }
 
 fn uncommented(text: &str) -> String {

@@ -74,8 +74,9 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     let text = if may_raise { "you may set it" } else { "you may not set it, which is optional" };
     tell("real-time priority", ("note", text.to_owned()))?;
     for name in BTreeSet::from_iter(companions::TABLE.iter().map(|it| it.executable)) {
-        let path = executable::find(Path::new(name)).ok();
-        let version_of = path.and_then(|path| printed(Command::new(path).arg("--version")));
+        let version_of = executable::find(Path::new(name))
+            .ok()
+            .and_then(|path| printed(Command::new(path).arg("--version")));
         tell(name, version(version_of.as_deref()))?;
     }
     tell("other robots", others(&robots::own().1, &robots::other_users()))?;

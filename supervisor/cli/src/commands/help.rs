@@ -211,8 +211,11 @@ fn drawn<'a>(rows: impl Iterator<Item = &'a str>, width: usize) -> Vec<String> {
     };
     let mut drawn = Vec::new();
     for (nth, row) in rows.iter().enumerate() {
-        let cells = row.iter().zip(&widths).map(|(cell, &width)| item::wrapped(cell, width, false));
-        let cells: Vec<Vec<String>> = cells.collect();
+        let cells: Vec<Vec<String>> = row
+            .iter()
+            .zip(&widths)
+            .map(|(cell, &width)| item::wrapped(cell, width, false))
+            .collect();
         let height = cells.iter().map(Vec::len).max().unwrap_or_default();
         for at in 0..height {
             let parts = cells.iter().map(|cell| cell.get(at).cloned().unwrap_or_default());

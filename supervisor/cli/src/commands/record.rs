@@ -102,8 +102,10 @@ impl Wishes for Asks {
         if self.signals.came() {
             return Wish::Stop;
         }
-        let asks = self.supervisor.as_mut();
-        let asked = asks.filter(|asks| matches!(poll::is_readable(asks, Duration::ZERO), Ok(true)));
+        let asked = self
+            .supervisor
+            .as_mut()
+            .filter(|asks| matches!(poll::is_readable(asks, Duration::ZERO), Ok(true)));
         match asked.map(|asks| asks.read(&mut [0])) {
             Some(Ok(1)) => return Wish::CatchUp,
             Some(_) => self.supervisor = None,

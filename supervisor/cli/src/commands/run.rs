@@ -184,12 +184,14 @@ fn options(arguments: &Arguments) -> Result<Options> {
 }
 
 fn tell_place(place: Option<&(PlaceSample, f64)>, stands: bool) {
-    let place = place.map(|(PlaceSample { x_m, y_m, heading_rad, sigma_m, .. }, age_s)| {
-        let heading = wrap_angle(*heading_rad).to_degrees();
-        let (within_m, ago) = (2.0 * sigma_m, age(Some(*age_s)));
-        format!("the robot believes it is where it stood {ago} ago: at ({x_m:.2}, {y_m:.2}) within {within_m:.2} m, heading {heading:.0} degrees")
-    });
-    let place = place.unwrap_or("the pose of the robot is unknown".to_owned());
+    let place = place.map_or(
+        "the pose of the robot is unknown".to_owned(),
+        |(PlaceSample { x_m, y_m, heading_rad, sigma_m, .. }, age_s)| {
+            let heading = wrap_angle(*heading_rad).to_degrees();
+            let (within_m, ago) = (2.0 * sigma_m, age(Some(*age_s)));
+            format!("the robot believes it is where it stood {ago} ago: at ({x_m:.2}, {y_m:.2}) within {within_m:.2} m, heading {heading:.0} degrees")
+        },
+    );
     let until = if stands { "; it stands until `firsthand resume`" } else { "" };
     say(format_args!("{place}; `firsthand place` corrects it{until}"));
 }

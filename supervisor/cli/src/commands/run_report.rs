@@ -55,9 +55,11 @@ fn svg(mission: &Mission, finished: &Finished, heard: &Hearer, summary: &Summary
         .filter(tried)
         .map(|target| DVec2::new(target.x_m, target.y_m))
         .collect();
-    let trails = heard.trails().iter();
-    let trails: Vec<_> =
-        trails.map(|it| Trail { places: &it.places, radius_m: it.radius_m }).collect();
+    let trails: Vec<_> = heard
+        .trails()
+        .iter()
+        .map(|it| Trail { places: &it.places, radius_m: it.radius_m })
+        .collect();
     picture::svg(&Scene {
         mission,
         grid: record.grid.frame().map(|frame| (frame, record.grid.cells())),

@@ -57,8 +57,10 @@ pub fn save_believed(
     let side = i64::from(frame.cells);
     let state = |col: i64, row: i64| {
         let is_inside = (0..side).contains(&col) && (0..side).contains(&row);
-        let byte = is_inside.then(|| cells.get((row * side + col) as usize)).flatten();
-        byte.map_or(CellState::Perimeter, |byte| CellState::from_byte(*byte))
+        is_inside
+            .then(|| cells.get((row * side + col) as usize))
+            .flatten()
+            .map_or(CellState::Perimeter, |byte| CellState::from_byte(*byte))
     };
     // Minus half a cell, because the surface may lie anywhere in its cell.
     let reach = mapper::step::hazard_reach_m(mission) / frame.resolution_m - 0.5;

@@ -37,8 +37,9 @@ fn motions(
 ) -> std::result::Result<(Increments, Vec<Motion>), String> {
     let mut rests = trace.legs();
     rests.retain(|leg| leg.told == Told::Stand && leg.seconds() >= RESTS_AFTER_S);
-    let longest = rests.iter().max_by(|one, other| one.seconds().total_cmp(&other.seconds()));
-    let Some(longest) = longest.copied() else {
+    let Some(longest) =
+        rests.iter().max_by(|one, other| one.seconds().total_cmp(&other.seconds())).copied()
+    else {
         return Err("the robot never stood still; see the logs of the run".to_owned());
     };
     let from_s = longest.from_s + RESTS_AFTER_S;

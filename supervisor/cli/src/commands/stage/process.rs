@@ -47,8 +47,10 @@ pub fn run(words: &[OsString]) -> Result {
     }
     let stage = operator::known_stage(&name).map_err(|unknown| {
         let known = super::subcommands();
-        let near = known.iter().find(|known| strsim::jaro_winkler(known, &name) > NEAR);
-        let near = near.map_or(String::new(), |near| format!("; did you mean `stage {near}`?"));
+        let near = known
+            .iter()
+            .find(|known| strsim::jaro_winkler(known, &name) > NEAR)
+            .map_or(String::new(), |near| format!("; did you mean `stage {near}`?"));
         Refused::new(
             "unknown-stage",
             format!("{unknown}; `stage` has no such subcommand either{near}"),

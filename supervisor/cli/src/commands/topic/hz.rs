@@ -79,8 +79,7 @@ pub fn main(arguments: &Arguments) -> Result {
             && let Some(readers) = follower.topics()
         {
             let now = Instant::now();
-            let reports = readers.iter_mut().map(|(_, rates)| rates.report(now));
-            let reports: Vec<_> = reports.collect();
+            let reports: Vec<_> = readers.iter_mut().map(|(_, rates)| rates.report(now)).collect();
             let table = || rates::table(&reports) + "\n";
             stream.write(&if arguments.json { json_lines(&reports)? } else { table() })?;
             due = Some(Instant::now() + REPORT_EVERY);

@@ -61,8 +61,8 @@ fn on_one_line(value: &Value, most: usize) -> String {
         Value::Double(number) => format!("{number:?}"),
         Value::Text(text) => format!("{text:?}"),
         Value::Array(elements) => {
-            let shown = elements.iter().take(most);
-            let shown: Vec<_> = shown.map(|element| on_one_line(element, most)).collect();
+            let shown: Vec<_> =
+                elements.iter().take(most).map(|element| on_one_line(element, most)).collect();
             let more = match elements.len().saturating_sub(most) {
                 0 => String::new(),
                 more => format!("  # {more} more"),
