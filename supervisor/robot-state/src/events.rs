@@ -180,9 +180,12 @@ impl Events {
     }
 
     fn request(&mut self, request: &RequestSample) {
-        let targets = request.targets().unwrap_or_default().iter();
-        let targets: String =
-            targets.map(|at| format!("({:.2}, {:.2}) ", at.x_m, at.y_m)).collect();
+        let targets: String = request
+            .targets()
+            .unwrap_or_default()
+            .iter()
+            .map(|at| format!("({:.2}, {:.2}) ", at.x_m, at.y_m))
+            .collect();
         let kind = words(request.kind());
         let asked = format!("{kind} {}{targets}", name_str(&request.stage));
         let asked = asked.trim_end();

@@ -65,11 +65,13 @@ pub fn judge(log: &Log, drive: &Drive) -> Judged {
 /// Returns the median error over stretches of the reference of this length.
 fn error_over(references: &[Pose2], poses: &[Pose2], way_m: f64) -> Option<f64> {
     let steps = references.windows(2).map(|it| it[0].position.distance(it[1].position));
-    let gone = steps.scan(0.0, |gone, step| {
-        *gone += step;
-        Some(*gone)
-    });
-    let gone: Vec<f64> = std::iter::once(0.0).chain(gone).collect();
+    let gone: Vec<f64> = std::iter::once(0.0)
+        .chain(steps)
+        .scan(0.0, |gone, step| {
+            *gone += step;
+            Some(*gone)
+        })
+        .collect();
     let errors = gone.iter().enumerate().map_while(|(from, begun)| {
         let to = gone.partition_point(|it| *it < begun + way_m);
         let of = |poses: &[Pose2]| Some(between(poses[from], *poses.get(to)?).position);

@@ -165,8 +165,9 @@ impl Collector {
         let [xx, xy, _, yy, ..] = pose.covariance;
         let of_pose = self.truths.iter().position(|truth| truth.is_of(pose));
         self.truths.drain(..of_pose.unwrap_or_default());
-        let truth = of_pose.and_then(|_| self.truths.front());
-        let truth = truth.map_or([f64::NAN; 3], |truth| [truth.x, truth.y, truth.heading]);
+        let truth = of_pose
+            .and_then(|_| self.truths.front())
+            .map_or([f64::NAN; 3], |truth| [truth.x, truth.y, truth.heading]);
         let volts = self.state.power.map_or([f64::NAN; 2], |power| [power.board_v, power.motor_v]);
         let values = [
             pose.stamp.seconds(),
@@ -197,8 +198,12 @@ impl Collector {
         assert_eq!(values.len(), COLUMNS.len());
         let ranges =
             self.newest.ranges.iter().flatten().map(|range| range.map_or(Value::Null, rounded));
-        let movers = self.newest.movers.as_ref().filter(|movers| !movers.is_empty());
-        let movers = movers.map(|movers| movers.iter().map(mover).collect::<Value>());
+        let movers = self
+            .newest
+            .movers
+            .as_ref()
+            .filter(|movers| !movers.is_empty())
+            .map(|movers| movers.iter().map(mover).collect::<Value>());
         Some(values.into_iter().map(rounded).chain(ranges).chain(movers).collect())
     }
 

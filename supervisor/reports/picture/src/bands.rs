@@ -177,8 +177,7 @@ impl Samples {
                 None if is_outermost(at) => nowhere,
                 // The bands continue below hazard cells instead of following their outline.
                 None => {
-                    let near = around([across, down], (at % across, at / across));
-                    let sum = near
+                    let sum = around([across, down], (at % across, at / across))
                         .map(|near| sums[near])
                         .fold((0.0, 0), |all, one| (all.0 + one.0, all.1 + one.1));
                     mean(&sum).unwrap_or(nowhere)

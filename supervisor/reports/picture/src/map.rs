@@ -67,8 +67,7 @@ enum Kind {
 /// Draws an SVG whose units are pixels.
 pub fn map_svg(map: &FieldOnMap<'_>) -> String {
     let lattice = Lattice::of_image(map.size, DVec2::splat(FRAME), cell_size(map.size));
-    let bands = Bands::of(&lattice, map.cells, &BANDS);
-    let bands = bands
+    let bands = Bands::of(&lattice, map.cells, &BANDS)
         .map_or(String::new(), |bands| bands.layer() + &flat_cells(map, &lattice, bands.levels));
     let lines = streamlines::layer(&lattice, map.cells, &LINES);
     let kinds = Blocks { lattice: &lattice, side: 1, kinds: kinds(map) };

@@ -40,8 +40,12 @@ impl<'a> Movers<'a> {
     }
 
     pub(super) fn layer(&self, view: &View) -> String {
-        let ways = self.trails.iter().map(|it| view.line(it.places.iter().map(|(_, at)| *at)));
-        let ways: String = ways.map(|way| way.element(&line())).collect();
+        let ways: String = self
+            .trails
+            .iter()
+            .map(|it| view.line(it.places.iter().map(|(_, at)| *at)))
+            .map(|way| way.element(&line()))
+            .collect();
         let (mut discs, mut robots, mut numbers) =
             (Path::default(), Path::default(), String::new());
         for (at_s, robot) in &self.instants {

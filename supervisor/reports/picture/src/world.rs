@@ -99,8 +99,11 @@ fn outlined(view: &View, world: &Shapes, outline: Outline) -> String {
             bodies.polygon(block.corners().map(|corner| view.place(corner)));
         }
     }
-    let walls = world.walls.iter().filter(|wall| has_it(wall.profile()));
-    let walls: String =
-        walls.map(|wall| view.line(wall.points.iter().copied()).element(&outline.line())).collect();
+    let walls: String = world
+        .walls
+        .iter()
+        .filter(|wall| has_it(wall.profile()))
+        .map(|wall| view.line(wall.points.iter().copied()).element(&outline.line()))
+        .collect();
     bodies.element(&outline.solid()) + &walls
 }

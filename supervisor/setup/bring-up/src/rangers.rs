@@ -82,8 +82,7 @@ pub(crate) fn liveliness(mission: &Mission, trace: &Trace, turned: bool) -> Vec<
             );
         }
         let seen_by_others = || {
-            let mut others = table.iter().enumerate();
-            others.any(|(other, it)| {
+            table.iter().enumerate().any(|(other, it)| {
                 let alike = it.kind == SensorKind::Cone && it.reach_m <= sensor.reach_m;
                 alike && 2 * sees(other) > readings(trace, other).count()
             })
@@ -343,11 +342,13 @@ pub(crate) fn moves(mission: &Mission, trace: &Trace, motion: &Motion) -> Moves 
     let rims_m = mission.body().track_m / 2.0;
     let turned_m = |[angle, _]: [f64; 2]| angle * rims_m;
     // A reversed wheel makes the body drive on a turn command. Sonars that agree on a turn saw one.
-    let mut driven = [Told::TurnLeft, Told::TurnRight].into_iter().filter_map(|told| {
-        let share = share_of_way(mission, trace, motion, told, turned_m)?;
-        (0.5..2.0).contains(&share.abs()).then_some(share)
-    });
-    let driven = driven.find(|_| turn.is_none_or(|turn| !turn.agrees));
+    let driven = [Told::TurnLeft, Told::TurnRight]
+        .into_iter()
+        .filter_map(|told| {
+            let share = share_of_way(mission, trace, motion, told, turned_m)?;
+            (0.5..2.0).contains(&share.abs()).then_some(share)
+        })
+        .find(|_| turn.is_none_or(|turn| !turn.agrees));
     let share = share_of_way(mission, trace, motion, Told::Drive, |[_, way]| way);
     // A front sonar that points elsewhere disagrees with the others.
     let is_ahead = driven.is_some() || turn.is_none_or(|turn| turn.agrees);

@@ -70,9 +70,12 @@ pub fn estimate(
         .map(|pair| pair[1].0)
         .collect();
     // Each window is a turn and its return; the first starts from rest.
-    let windows = turns.windows(3).map(|ends| (ends[0], ends[2]));
-    let fits = windows.filter_map(|window| Fit::best(commands, headings, (body, by), window));
-    let mut fits: Vec<Fit> = fits.filter(|fit| fit.explained >= EXPLAINED).collect();
+    let mut fits: Vec<Fit> = turns
+        .windows(3)
+        .map(|ends| (ends[0], ends[2]))
+        .filter_map(|window| Fit::best(commands, headings, (body, by), window))
+        .filter(|fit| fit.explained >= EXPLAINED)
+        .collect();
     // On a busy machine the robot stands still in some windows.
     fits.sort_by(|one, other| other.explained.total_cmp(&one.explained));
     fits.truncate(FEWEST.max(fits.len().div_ceil(2)));

@@ -63,15 +63,17 @@ impl Driven {
 /// Returns the taped ends as equations in e and tau, linear near `wheels`: x and y of each square.
 fn rows(squares: &[Driven], wheels: Wheels, track_m: f64) -> Rows {
     let Wheels { e, track } = wheels;
-    let rows = squares.iter().flat_map(|square| {
-        let end = |e, track| square.by(Wheels { e, track }, track_m);
-        let (here, by_slip) = end(e, track);
-        let by_e = (end(e + NUDGE, track).0 - here) / NUDGE;
-        let by_track = (end(e, track + NUDGE).0 - here) / NUDGE;
-        let value = square.end - here + by_e * e + by_track * track;
-        [0, 1].map(|axis| ([by_e[axis], by_track[axis]], value[axis], by_slip))
-    });
-    let rows: Vec<_> = rows.collect();
+    let rows: Vec<_> = squares
+        .iter()
+        .flat_map(|square| {
+            let end = |e, track| square.by(Wheels { e, track }, track_m);
+            let (here, by_slip) = end(e, track);
+            let by_e = (end(e + NUDGE, track).0 - here) / NUDGE;
+            let by_track = (end(e, track + NUDGE).0 - here) / NUDGE;
+            let value = square.end - here + by_e * e + by_track * track;
+            [0, 1].map(|axis| ([by_e[axis], by_track[axis]], value[axis], by_slip))
+        })
+        .collect();
     let by_tape = DMatrix::from_diagonal_element(rows.len(), rows.len(), TAPE_M * TAPE_M);
     Rows::new(&rows, by_tape)
 }

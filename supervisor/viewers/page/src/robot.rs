@@ -75,12 +75,15 @@ impl Reading {
         if logs_read.elapsed() >= LOGS_EVERY {
             *logs_read = Instant::now();
             let mut at = None;
-            let lines = logs.take().into_iter().map(|(process, line)| {
-                // A line without a time continues the one before.
-                at = written(&line).or(at);
-                (at, process, line)
-            });
-            let mut lines: Vec<_> = lines.collect();
+            let mut lines: Vec<_> = logs
+                .take()
+                .into_iter()
+                .map(|(process, line)| {
+                    // A line without a time continues the one before.
+                    at = written(&line).or(at);
+                    (at, process, line)
+                })
+                .collect();
             lines.sort_by_key(|(at, ..)| *at);
             for (at, process, line) in lines {
                 let at_s = at.and_then(|at| mission_s(*clock, at));

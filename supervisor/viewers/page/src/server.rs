@@ -102,8 +102,11 @@ async fn answer(context: &Arc<Context>, request: Request, place: Place) -> Respo
 /// Returns the host of `request` if its headers agree and the page answers to it.
 fn host(context: &Context, request: &Request) -> Option<String> {
     let host = context.access.host(single(request.headers(), &header::HOST)?)?;
-    let absolute = request.uri().authority();
-    absolute.is_none_or(|absolute| absolute.as_str() == host).then(|| host.to_owned())
+    request
+        .uri()
+        .authority()
+        .is_none_or(|absolute| absolute.as_str() == host)
+        .then(|| host.to_owned())
 }
 
 async fn session(context: &Arc<Context>, request: Request, place: Place) -> Response {

@@ -104,17 +104,20 @@ impl Page {
 fn keep(domain: &Domain, port: u16, addresses: &str) -> Result<PathBuf, FileError> {
     let directory = domain.directory().parent().unwrap_or(domain.directory());
     let file = directory.join(format!("{}.page-{port}", domain.robot));
-    let written = make_own_directory(directory).map_err(io::Error::other).and_then(|()| {
-        // A killed page leaves its file.
-        let _ = fs::remove_file(&file);
-        fs::OpenOptions::new()
-            .write(true)
-            .create_new(true)
-            .mode(0o600)
-            .open(&file)?
-            .write_all(addresses.as_bytes())
-    });
-    written.map_err(FileError::of("keep", &file)).map(|()| file)
+    make_own_directory(directory)
+        .map_err(io::Error::other)
+        .and_then(|()| {
+            // A killed page leaves its file.
+            let _ = fs::remove_file(&file);
+            fs::OpenOptions::new()
+                .write(true)
+                .create_new(true)
+                .mode(0o600)
+                .open(&file)?
+                .write_all(addresses.as_bytes())
+        })
+        .map_err(FileError::of("keep", &file))
+        .map(|()| file)
 }
 
 impl Drop for Page {

@@ -58,10 +58,9 @@ pub async fn run(mut socket: WebSocket, stranger: Place, context: &Arc<Context>)
         () = lost(&stranger) => None,
     };
     let role = match &first {
-        Some(Ok(Message::Text(text))) => {
-            let hello = serde_json::from_str::<Hello>(text).ok();
-            hello.and_then(|hello| context.access.role(&hello.token))
-        }
+        Some(Ok(Message::Text(text))) => serde_json::from_str::<Hello>(text)
+            .ok()
+            .and_then(|hello| context.access.role(&hello.token)),
         _ => None,
     };
     let (sender, mut receiver) = socket.split();

@@ -171,8 +171,11 @@ impl<'a> Asker<'a> {
 
     /// Returns `None` if it does not arrive or is incompatible.
     fn run(&self) -> Result<Option<Run>> {
-        let reply = self.ask("run")?.recv().ok();
-        let run = reply.and_then(|reply| checked(&String::from_utf8(payload(&reply)?).ok()?));
+        let run = self
+            .ask("run")?
+            .recv()
+            .ok()
+            .and_then(|reply| checked(&String::from_utf8(payload(&reply)?).ok()?));
         if run.is_none() {
             say("the robot's run file is missing or of another version");
         }

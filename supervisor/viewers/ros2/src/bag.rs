@@ -39,8 +39,11 @@ pub fn make(namespace: &str, arguments: &Arguments) -> Result<String, Failure> {
         names.insert(id, name);
     }
     // Begins at the first pose, so that sensor mountings precede sensor messages.
-    let first = recordings[0].samples(&topics::POSE)?.next().transpose()?;
-    let began_ns = first.map_or(0, |first| first.stamp.stamp_ns);
+    let began_ns = recordings[0]
+        .samples(&topics::POSE)?
+        .next()
+        .transpose()?
+        .map_or(0, |first| first.stamp.stamp_ns);
     let mut messages = Vec::new();
     shown.mounting(began_ns, &mut |id, payload| messages.push((began_ns, id, payload)));
     let wanted: Vec<_> = TOPICS.iter().map(|topic| topic.spec().name).collect();

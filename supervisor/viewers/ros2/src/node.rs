@@ -190,10 +190,13 @@ impl<Id: Copy + Ord> Node<Id> {
     }
 
     pub fn heard(&mut self) -> io::Result<Vec<(Id, Message)>> {
-        let heard = self.readers.iter().flat_map(|(id, reader)| {
-            reader.messages().take(AT_A_TIME).map(|message| (*id, message))
-        });
-        let mut heard: Vec<_> = heard.collect();
+        let mut heard: Vec<_> = self
+            .readers
+            .iter()
+            .flat_map(|(id, reader)| {
+                reader.messages().take(AT_A_TIME).map(|message| (*id, message))
+            })
+            .collect();
         for (id, reader) in &mut self.late_readers {
             heard.extend(reader.take(AT_A_TIME)?.into_iter().map(|message| (*id, message)));
         }

@@ -129,8 +129,10 @@ pub struct Arguments {
 
 /// Parses a number from 0 to less than a day's seconds.
 fn amount(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|number| (0.0..86_400.0).contains(number));
-    number.ok_or_else(|| "not an amount; give a number from 0 to below 86400".to_owned())
+    text.parse()
+        .ok()
+        .filter(|number| (0.0..86_400.0).contains(number))
+        .ok_or_else(|| "not an amount; give a number from 0 to below 86400".to_owned())
 }
 
 /// Returns the radius of the outline's largest circle around the robot's centre.

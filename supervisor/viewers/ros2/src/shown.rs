@@ -90,10 +90,13 @@ impl Shown {
     }
 
     pub fn mounting(&self, now_ns: u64, sink: Sink<'_>) {
-        let used = self.sensors.iter().filter(|sensor| sensor.used);
-        let mounts = used
-            .map(|sensor| (BASE, sensor.name.as_str(), plane(sensor.mount.on(Pose2::default()))));
-        sink(Id::TfStatic, transforms(now_ns, &mounts.collect::<Vec<_>>()));
+        let mounts: Vec<_> = self
+            .sensors
+            .iter()
+            .filter(|sensor| sensor.used)
+            .map(|sensor| (BASE, sensor.name.as_str(), plane(sensor.mount.on(Pose2::default()))))
+            .collect();
+        sink(Id::TfStatic, transforms(now_ns, &mounts));
     }
 
     pub fn sample(&mut self, sample: &Sample, now_ns: u64, sink: Sink<'_>) {
@@ -389,8 +392,10 @@ fn way(frame: GridFrame, cells: &[FieldCell], from: DVec2, to: DVec2) -> Vec<Pos
     let step_m = frame.resolution_m / 2.0;
     let (mut at, mut way) = (from, Vec::new());
     for step in 0..frame.cells as usize * STEPS_A_CELL {
-        let cell = frame.cell_at(at).and_then(|cell| cells.get(frame.index(cell)));
-        let ahead = cell.map_or(DVec2::ZERO, |cell| DVec2::new(cell.ex.into(), cell.ey.into()));
+        let ahead = frame
+            .cell_at(at)
+            .and_then(|cell| cells.get(frame.index(cell)))
+            .map_or(DVec2::ZERO, |cell| DVec2::new(cell.ex.into(), cell.ey.into()));
         if at.distance(to) <= frame.resolution_m || !ahead.is_finite() || ahead == DVec2::ZERO {
             break;
         }
