@@ -50,8 +50,7 @@ pub fn entries(directory: &Path) -> impl Iterator<Item = fs::DirEntry> + use<> {
 
 /// Returns users with present or former robots here. Only they can list them.
 pub fn other_users() -> Vec<u32> {
-    let own = rustix::process::geteuid().as_raw();
-    users_in(Path::new("/tmp"), own)
+    users_in(Path::new("/tmp"), rustix::process::geteuid().as_raw())
 }
 
 fn users_in(directory: &Path, own: u32) -> Vec<u32> {

@@ -219,8 +219,7 @@ impl Record {
     /// Returns the robot's place if it arrived outside the tolerance, at the planner's nearest
     /// point to a target in or beside a hazard.
     pub(crate) fn beside(&self, arrival: &CommandSample, tolerance_m: f64) -> Option<DVec2> {
-        let guidance = self.guidance_at(arrival.stamp.tick)?;
-        let is_near = guidance.status() == GuidanceStatus::AtTarget;
+        let is_near = self.guidance_at(arrival.stamp.tick)?.status() == GuidanceStatus::AtTarget;
         let pose = self.pose_at(arrival.stamp.tick)?;
         (is_near && arrival.distance_m > tolerance_m).then(|| pose.pose().position)
     }

@@ -144,10 +144,9 @@ impl Supervisor<'_> {
     }
 
     fn send_robot(&mut self, request: &RequestSample, appends: bool) -> RequestAnswer {
-        let record = &self.record;
         let mission = &self.options.mission;
         let points = request.targets();
-        if let Some(answer) = target_list::refusal(points, self.why_held(), mission, record) {
+        if let Some(answer) = target_list::refusal(points, self.why_held(), mission, &self.record) {
             return answer;
         }
         let points = points.unwrap_or_default();

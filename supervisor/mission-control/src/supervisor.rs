@@ -224,8 +224,7 @@ impl<'a> Supervisor<'a> {
                 self.service.show(|| progress.to_string());
                 surroundings.restore();
             }
-            let any_starting = self.stages.any_starting();
-            self.cleanup.run_if_due(&self.bus.bus, any_starting);
+            self.cleanup.run_if_due(&self.bus.bus, self.stages.any_starting());
             self.service.feed();
             self.wait()?;
         }

@@ -215,8 +215,7 @@ impl TargetList {
             Outcome::Timeout => TargetOutcome::TimedOut,
             _ => TargetOutcome::Unreachable,
         };
-        let arrival = arrival.filter(|_| outcome == Outcome::Reached);
-        self.end_current(given_up, now_s, arrival);
+        self.end_current(given_up, now_s, arrival.filter(|_| outcome == Outcome::Reached));
         self.drop_ahead(TargetOutcome::NotTried);
         self.waits = true;
     }

@@ -281,8 +281,7 @@ fn remove_run(domain: &Domain) -> Result<(), DomainError> {
 fn wipe(domain: &Domain) -> Result<(), DomainError> {
     remove_file(&domain.middleware_config())?;
     let directory = domain.directory();
-    let configs = fs::read_dir(directory).map_err(failed("read", directory))?;
-    for entry in configs.flatten() {
+    for entry in fs::read_dir(directory).map_err(failed("read", directory))?.flatten() {
         let name = entry.file_name();
         if name.as_encoded_bytes().starts_with(b"iceoryx2") {
             remove_file(&entry.path())?;

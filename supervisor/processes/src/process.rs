@@ -134,8 +134,7 @@ impl Process {
         let pid = i32::try_from(id).ok().and_then(Pid::from_raw).ok_or(io::ErrorKind::NotFound)?;
         let pidfd = pidfd_open(pid, PidfdFlags::empty())?;
         // The id may belong to another process by now.
-        let called = fs::read_to_string(format!("/proc/{id}/comm"))?;
-        if called.trim_end() != name {
+        if fs::read_to_string(format!("/proc/{id}/comm"))?.trim_end() != name {
             return Err(io::ErrorKind::NotFound.into());
         }
         Ok(Self { child: None, id, pidfd })

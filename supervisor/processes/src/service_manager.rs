@@ -33,8 +33,7 @@ impl ServiceManager {
     }
 
     pub fn show(&mut self, status: impl FnOnce() -> String) {
-        let due = self.shown.is_none_or(|shown| shown.elapsed() >= STATUS_EVERY);
-        if due {
+        if self.shown.is_none_or(|shown| shown.elapsed() >= STATUS_EVERY) {
             self.shown = Some(Instant::now());
             notify(&[NotifyState::Status(&status())]);
         }

@@ -165,8 +165,7 @@ impl StageProcess {
     /// Returns the time of the last beat without the process's waits for a processor. While no beat
     /// comes, the policy judges the process.
     pub(crate) fn unstarved(&self) -> Now {
-        let starved = self.times.unwrap_or_default().starved;
-        self.beat.unwrap_or_default().saturating_sub(starved)
+        self.beat.unwrap_or_default().saturating_sub(self.times.unwrap_or_default().starved)
     }
 
     /// Returns the cause if the process has ended.

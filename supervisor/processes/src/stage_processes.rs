@@ -264,8 +264,7 @@ impl StageProcesses {
     }
 
     pub fn running(&self) -> (usize, usize) {
-        let running = self.stages.iter().filter(|stage| stage.is_running());
-        (running.count(), self.stages.len())
+        (self.stages.iter().filter(|stage| stage.is_running()).count(), self.stages.len())
     }
 
     /// Returns the external stages that do not beat as ready.

@@ -108,8 +108,7 @@ impl Recording {
         let foreign =
             |problem: String| RecordingError::Foreign { file: path.to_path_buf(), problem };
         let Some(mut about) = about else {
-            let problem = problem.unwrap_or_else(|| "it names no run".to_owned());
-            return Err(foreign(problem));
+            return Err(foreign(problem.unwrap_or_else(|| "it names no run".to_owned())));
         };
         let mut about = |key| about.remove(key).unwrap_or_default();
         let run_text: String = about("run_toml");

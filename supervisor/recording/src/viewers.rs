@@ -149,8 +149,7 @@ impl Drawn {
             let mount = |sensor: &Sensor| {
                 transform(time, BASE, &sensor.name, sensor.mount.on(Pose2::default()))
             };
-            let transforms = Message::default().parts(1, self.sensors.iter().map(mount));
-            sink(TRANSFORMS, transforms.bytes());
+            sink(TRANSFORMS, Message::default().parts(1, self.sensors.iter().map(mount)).bytes());
             sink(SCENE, self.scene(time).bytes());
         }
         for reading in readings {

@@ -175,9 +175,8 @@ impl RobotState {
     }
 
     fn does(&self) -> (Kind, String) {
-        let supervisor = self.supervisor.unwrap_or_default();
         let status = self.guidance.unwrap_or_default().status;
-        let (kind, text) = match (&self.link, supervisor.reason()) {
+        let (kind, text) = match (&self.link, self.supervisor.unwrap_or_default().reason()) {
             (Some(link), _) if link.connected == 0 && link.losses > 0 => {
                 return (Kind::Bad, "the robot does not answer".to_owned());
             }
@@ -219,8 +218,7 @@ impl RobotState {
     }
 
     pub fn to_go_m(&self) -> Option<f64> {
-        let at = self.target()?.target.position();
-        Some(self.pose?.pose().position.distance(at))
+        Some(self.pose?.pose().position.distance(self.target()?.target.position()))
     }
 
     /// Returns the remaining distance and target number in words.

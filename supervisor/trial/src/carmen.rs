@@ -42,8 +42,7 @@ pub(crate) fn read(file: &Path) -> Result<Log, LogError> {
         if read.map_err(unreadable)? == 0 {
             break;
         }
-        let text = String::from_utf8_lossy(&line);
-        let taken = reading.take(&text);
+        let taken = reading.take(&String::from_utf8_lossy(&line));
         if taken.is_none() || reading.instants.len() > MOST_INSTANTS {
             return Err(LogError::Line { file: file.to_owned(), number });
         }

@@ -127,9 +127,8 @@ pub fn drive(log: &Log, mission: &Mission) -> Option<Drive> {
     let first = log.instants.first()?;
     let (mut poses, mut fixes) = (Vec::new(), 0);
     for (index, instant) in log.instants.iter().enumerate() {
-        let next = log.instants.get(index + 1).unwrap_or(instant);
         driver.wait_until(BEGINS_NS + ((instant.time_s - first.time_s) * 1e9) as u64);
-        driver.take(instant, next);
+        driver.take(instant, log.instants.get(index + 1).unwrap_or(instant));
         if instant.scan.is_some() {
             let mut pose = driver.pose;
             if let Some(fix) = driver.sources.fixes.last() {
@@ -172,8 +171,7 @@ impl Driver<'_> {
         });
         debug_assert!(speeds.iter().all(|it| it.is_finite()));
         self.order();
-        let bytes = said(instant, speeds, self.heard);
-        self.give(Event::Datagram(&bytes));
+        self.give(Event::Datagram(&said(instant, speeds, self.heard)));
         let mut command = CommandSample {
             left_rad_s: speeds[0],
             right_rad_s: speeds[1],
@@ -246,8 +244,7 @@ impl Driver<'_> {
     fn resume(&mut self) {
         for request in [Request::Stop, Request::Resume] {
             let now = MissionTime(self.now_ns);
-            let event = Event::Operator(request);
-            self.link.step(Entry { event, machine_ns: self.now_ns, now });
+            self.link.step(Entry { event: Event::Operator(request), machine_ns: self.now_ns, now });
         }
     }
 }

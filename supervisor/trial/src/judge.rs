@@ -84,8 +84,7 @@ fn error_over(references: &[Pose2], poses: &[Pose2], way_m: f64) -> Option<f64> 
 fn cells(log: &Log, drive: &Drive, poses: &[Pose2]) -> usize {
     let (first_rad, step_rad) = drive.laser.fan();
     let mut touched = BTreeSet::new();
-    let scans = log.scanned().filter_map(|it| it.scan.as_ref());
-    for (scan, pose) in scans.zip(poses) {
+    for (scan, pose) in log.scanned().filter_map(|it| it.scan.as_ref()).zip(poses) {
         let laser = drive.laser.mount.on(*pose);
         for (beam, range) in scan.iter().enumerate() {
             let range = f64::from(*range);

@@ -90,8 +90,7 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
 
 /// `None` if it does not start.
 fn printed(command: &mut Command) -> Option<String> {
-    let output = command.output().ok()?;
-    Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+    Some(String::from_utf8_lossy(&command.output().ok()?.stdout).trim().to_owned())
 }
 
 fn needed(it: Result<(), DomainError>) -> Verdict {

@@ -97,7 +97,8 @@ pub fn main(arguments: &Arguments) -> Result {
     for (file, text) in &changed {
         put(file, text)?;
     }
-    print_line(format_args!("# Then:\n{}", remaining()))
+    let units = stages::TABLE.iter().map(|stage| format!("\n    firsthand-stage@{}", stage.name));
+    print_line(format_args!("# Then:\n{THEN}{}", units.collect::<String>()))
 }
 
 /// Refuses an executable that a service could not start.
@@ -121,11 +122,6 @@ fn put(file: &Path, text: &str) -> Result {
     let refused =
         |error| format!("cannot write {}: {error}; as root, or with --root?", file.display());
     Ok(written.map_err(refused)?)
-}
-
-fn remaining() -> String {
-    let units = stages::TABLE.iter().map(|stage| format!("\n    firsthand-stage@{}", stage.name));
-    format!("{THEN}{}", units.collect::<String>())
 }
 
 #[cfg(test)]

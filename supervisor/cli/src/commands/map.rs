@@ -37,8 +37,7 @@ pub fn main(arguments: &Arguments) -> Result {
     let Action::Save { run, out } = &arguments.action;
     let mut grid = Replica::default();
     // A resumed run has several recordings, of which the last has the last map.
-    let parts = recording::parts(run);
-    let recording = Recording::open(parts.last().unwrap_or(run))?;
+    let recording = Recording::open(recording::parts(run).last().unwrap_or(run))?;
     for sample in recording.slices(&topics::GRID)? {
         let (header, cells) = sample?;
         grid.apply(&header.part, &cells);
@@ -46,7 +45,6 @@ pub fn main(arguments: &Arguments) -> Result {
     let frame = grid.frame().ok_or_else(|| {
         Refused::new("no-map", format!("{} contains no map; give a run that drove", run.display()))
     })?;
-    let mission = &recording.run.mission;
-    maps::save_believed(out, mission, &frame, grid.cells())?;
+    maps::save_believed(out, &recording.run.mission, &frame, grid.cells())?;
     print_line(out.display())
 }

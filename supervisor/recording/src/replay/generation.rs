@@ -112,8 +112,7 @@ impl<'a> Generation<'a> {
     fn entry(&mut self, body: Vec<u8>) {
         let Some(replay) = &mut self.replay else {
             let fields = self.setting.recorded.contains_key(topics::FIELD.spec().name);
-            let beginning = Beginning { run: self.setting.run, start: &body, fields };
-            match (self.stage.replay)(beginning) {
+            match (self.stage.replay)(Beginning { run: self.setting.run, start: &body, fields }) {
                 Ok(replay) => self.replay = Some(replay),
                 Err(error) => self.give_up(&error),
             }

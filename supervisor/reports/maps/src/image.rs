@@ -159,8 +159,7 @@ fn png(reader: impl BufRead + Seek, lightness: Lightness, file: &Path) -> Result
         let samples = pixel.chunks_exact(bytes).map(brightness);
         lightness.is_free(samples.zip(weights).map(|(sample, weight)| sample * weight).sum())
     };
-    let free = samples.chunks_exact(bytes * weights.len()).map(is_free);
-    Ok(Map::new(cols as usize, free))
+    Ok(Map::new(cols as usize, samples.chunks_exact(bytes * weights.len()).map(is_free)))
 }
 
 #[cfg(test)]

@@ -144,9 +144,8 @@ impl Keys {
 
     fn image(&self, file: &Path) -> Result<(PathBuf, Lightness), String> {
         let image = self.scalar("image")?.ok_or_else(|| missing("image: FILE"))?;
-        let folder = file.parent().unwrap_or(Path::new(""));
         // `join` keeps an absolute path.
-        Ok((folder.join(image), self.lightness()?))
+        Ok((file.parent().unwrap_or(Path::new("")).join(image), self.lightness()?))
     }
 
     /// Returns the side of a cell and the corner of least x and y, metres.

@@ -60,9 +60,8 @@ fn coarsened(lattice: &Lattice, cells: &[u8], block: usize) -> Vec<CellState> {
             tally[at][kind as usize] += 1;
         }
     }
-    let kinds = [CellState::Sensed, CellState::Known, CellState::Perimeter];
     let most = |count: &[u32; 6]| {
-        kinds
+        [CellState::Sensed, CellState::Known, CellState::Perimeter]
             .into_iter()
             .filter(|kind| count[*kind as usize] > 0)
             .max_by_key(|kind| count[*kind as usize])

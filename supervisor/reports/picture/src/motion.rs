@@ -172,8 +172,7 @@ fn halo(line: &Path) -> String {
 
 fn trajectory(view: &View, poses: &[Pose2]) -> Path {
     let stride = poses.len().div_ceil(MOST_POSES).max(1);
-    let kept = poses.iter().step_by(stride).chain(poses.last());
-    view.line(kept.map(|pose| pose.position))
+    view.line(poses.iter().step_by(stride).chain(poses.last()).map(|pose| pose.position))
 }
 
 fn is_shown(view: &View, pose: &Pose2) -> bool {

@@ -118,8 +118,7 @@ fn evenly_spaced(lattice: &Lattice, cells: &[FieldCell], spacing: f64) -> Vec<Ve
         lines.extend(tracer.line_through(seed));
         // The next lines begin beside a drawn one.
         while let Some(line) = lines.get(seeded_from) {
-            let beside = tracer.beside(line);
-            for seed in beside {
+            for seed in tracer.beside(line) {
                 lines.extend(tracer.line_through(seed));
             }
             seeded_from += 1;

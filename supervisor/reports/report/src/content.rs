@@ -52,8 +52,7 @@ pub(crate) struct Content {
 impl Content {
     /// Reads the parts of a run in order; there is at least one.
     pub(crate) fn read(files: &[PathBuf]) -> Result<Self, RecordingError> {
-        let first = Recording::open(&files[0])?;
-        let mut content = Self::of(&first);
+        let mut content = Self::of(&Recording::open(&files[0])?);
         for file in files {
             content.part(&Recording::open(file)?)?;
         }

@@ -148,10 +148,8 @@ impl Grid {
 
     fn sees(&self, from: DVec2, to: DVec2) -> bool {
         let steps = (from.distance(to) / (CELL_M / 2.0)).ceil().max(1.0);
-        (0..=steps as u32).all(|step| {
-            let at = from.lerp(to, f64::from(step) / steps);
-            self.is_free(self.cell(at))
-        })
+        (0..=steps as u32)
+            .all(|step| self.is_free(self.cell(from.lerp(to, f64::from(step) / steps))))
     }
 }
 

@@ -105,8 +105,7 @@ pub fn findings(mission: &Mission, trace: &Trace, lifted: bool) -> (Vec<Finding>
     let motors = moves.finding(mission, wheels.is_as_told());
     let are_right = motors.is_none();
     found.extend(motors);
-    let has_gyro = gyro_scale.is_some();
-    found.extend(scans::findings(mission, trace, placed.as_ref(), &moves, has_gyro));
+    found.extend(scans::findings(mission, trace, placed.as_ref(), &moves, gyro_scale.is_some()));
     found.extend(rangers::gyro_finding(mission, gyro_scale, sure, &moves));
     if are_right || sure.is_some() {
         found.extend(rangers::findings(mission, trace, &motion, sure, &moves));

@@ -417,9 +417,8 @@ pub(crate) fn findings(
         let behind = aside.abs() > FRAC_PI_2;
         bearing_rad = wrap_angle(at.to_angle() + if behind { PI } else { 0.0 });
         let forward_m = if behind { -at.length() } else { at.length() };
-        let text = format!("is mounted {:.2} m from its stated place", off.length());
         found.push(
-            Finding::wrong(name, text)
+            Finding::wrong(name, format!("is mounted {:.2} m from its stated place", off.length()))
                 .with_key(key("forward_m"), format!("{forward_m:.3}"))
                 .with_key(key("bearing_deg"), format!("{:.1}", bearing_rad.to_degrees())),
         );

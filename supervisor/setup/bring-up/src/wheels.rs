@@ -49,8 +49,7 @@ impl Wheels {
     /// Fits by least squares over all times at which the base has settled.
     pub(crate) fn of(trace: &Trace) -> Self {
         let (mut squares, mut products) = (Matrix2::zeros(), Matrix2::zeros());
-        let legs = trace.legs();
-        for leg in legs.iter().filter(|leg| leg.told != Told::Stand) {
+        for leg in trace.legs().iter().filter(|leg| leg.told != Told::Stand) {
             let settled = leg.from_s + SETTLED_S.min(leg.seconds() / 2.0);
             let in_leg = trace.rolled.iter().filter(|(at, _)| (settled..leg.until_s).contains(at));
             for (before, now) in zip(in_leg.clone(), in_leg.skip(1)) {

@@ -90,8 +90,7 @@ pub fn estimate(
     Ok(Estimate {
         delay_s: Measured { sd: delay.sd.max(DELAY_STEP_S / 2.0), ..delay },
         acceleration_m_s2: (2 * limited > fits.len()).then(|| {
-            let finite = fits.iter().filter(|fit| fit.acceleration.is_finite());
-            let found = measured(finite.map(rims));
+            let found = measured(fits.iter().filter(|fit| fit.acceleration.is_finite()).map(rims));
             // The accelerations tried are this coarse.
             Measured { sd: found.sd.max((RATIO - 1.0) / 2.0 * found.value), ..found }
         }),

@@ -152,8 +152,7 @@ impl Wall {
 
     pub fn step(&mut self, counts: [u16; 2], echo_m: Option<f64>, body: &Body) -> Order {
         self.ways.step(counts, body);
-        let heading = self.heading(body);
-        self.advance(heading, echo_m, body);
+        self.advance(self.heading(body), echo_m, body);
         self.order(self.heading(body), echo_m)
     }
 
@@ -267,8 +266,7 @@ impl Wall {
         }
         let done = self.loops.len();
         let side = if done.is_multiple_of(2) { 1.0 } else { -1.0 };
-        let turns = self.turns(estimate.as_ref(), body);
-        self.enter(Phase::Turn(side * (TAU * turns + PI)));
+        self.enter(Phase::Turn(side * (TAU * self.turns(estimate.as_ref(), body) + PI)));
     }
 
     fn half_rad(&self) -> f64 {

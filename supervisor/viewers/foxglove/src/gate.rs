@@ -40,8 +40,7 @@ pub fn open(listener: TcpListener, server: SocketAddr, origins: Vec<String>) {
             if let Ok(client) = client
                 && Arc::strong_count(&origins) <= MOST_CLIENTS
             {
-                let serve = move || drop(pass(&client, server, &origins));
-                let _ = thread::Builder::new().spawn(serve);
+                let _ = thread::Builder::new().spawn(move || drop(pass(&client, server, &origins)));
             }
         }
     });

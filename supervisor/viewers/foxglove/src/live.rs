@@ -128,8 +128,7 @@ impl Live {
     fn channels(&self, mission: &Mission) -> HashMap<String, Arc<RawChannel>> {
         let topics = served().map(|topic| {
             let schema::Schema { name, text } = schema::of(topic);
-            let schema = Schema::new(name, "ros2msg", text.into_bytes());
-            (topic.spec().name.to_owned(), schema, "cdr")
+            (topic.spec().name.to_owned(), Schema::new(name, "ros2msg", text.into_bytes()), "cdr")
         });
         let drawn = viewers::channels(Some(mission)).into_iter();
         let drawn = drawn.map(|Channel { topic, schema, descriptors }| {

@@ -86,8 +86,7 @@ impl Reading {
                 .collect();
             lines.sort_by_key(|(at, ..)| *at);
             for (at, process, line) in lines {
-                let at_s = at.and_then(|at| mission_s(*clock, at));
-                collector.state.log(&process, &line, at_s);
+                collector.state.log(&process, &line, at.and_then(|at| mission_s(*clock, at)));
             }
             ended = results.take();
         }

@@ -34,8 +34,7 @@ pub fn make(namespace: &str, arguments: &Arguments) -> Result<String, Failure> {
     let mut bag = Bag::create(out)?;
     let mut names = BTreeMap::new();
     for (row, id, name) in published(namespace, shown.sensor_topics()) {
-        let kind = row.message.join("/msg/");
-        bag.add([&name, &kind, row.definition], row.is_latched)?;
+        bag.add([&name, &row.message.join("/msg/"), row.definition], row.is_latched)?;
         names.insert(id, name);
     }
     // Begins at the first pose, so that sensor mountings precede sensor messages.

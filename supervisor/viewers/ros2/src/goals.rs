@@ -153,8 +153,8 @@ impl<T> Goals<T> {
     pub fn take_status(&mut self) -> Option<Vec<u8>> {
         let status =
             |goal: &Goal<T>| GoalStatus { goal_info: goal.info(), status: goal.status as i8 };
-        let is_changed = std::mem::take(&mut self.is_changed);
-        let list = || GoalStatusArray { status_list: self.goals.iter().map(status).collect() };
-        is_changed.then(|| list().encode())
+        std::mem::take(&mut self.is_changed).then(|| {
+            GoalStatusArray { status_list: self.goals.iter().map(status).collect() }.encode()
+        })
     }
 }

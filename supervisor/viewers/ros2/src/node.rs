@@ -129,8 +129,7 @@ impl<Id: Copy + Ord> Node<Id> {
 
     fn offer(&mut self, service: Service, name: &str, kind: &str) -> io::Result<()> {
         let [requests, replies] = Topic::service(name, kind);
-        let server = self.participant.server([&requests, &replies], SURE)?;
-        self.services.insert(service, server);
+        self.services.insert(service, self.participant.server([&requests, &replies], SURE)?);
         Ok(())
     }
 

@@ -27,9 +27,8 @@ pub fn overlap<'a>(
 
 fn read(mission: &Mission) -> impl Iterator<Item = String> {
     let topics = &mission.robot.ros2;
-    let lasers = mission.lasers_of_base();
     let is_unnamed = |(_, laser): &(usize, Sensor)| !topics.ranges.contains_key(&laser.name);
-    let scan = lasers.iter().any(is_unnamed).then_some(&topics.scan);
+    let scan = mission.lasers_of_base().iter().any(is_unnamed).then_some(&topics.scan);
     let further = topics.imu.iter().chain(scan).chain(topics.ranges.values());
     [&topics.odom, &topics.battery].into_iter().chain(further).map(|name| Topic::new(name, "").name)
 }

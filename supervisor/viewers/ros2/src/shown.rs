@@ -126,8 +126,7 @@ impl Shown {
             }
             Some(Some(robot)) => {
                 let Pose2 { position, heading } = sample.pose();
-                let pose = DAffine2::from_angle_translation(heading, position);
-                let origin = pose * robot.inverse();
+                let origin = DAffine2::from_angle_translation(heading, position) * robot.inverse();
                 let [x, y] = origin.translation.to_array();
                 let origin = [x, y, origin.matrix2.x_axis.to_angle()];
                 sink(Id::Tf, transforms(now_ns, &[(MAP, ODOM, origin)]));

@@ -81,8 +81,7 @@ fn show(robot: &RobotName) -> Result<(), TopError> {
         // The destructor would report an error on standard error, and panic if that is closed too.
         std::mem::forget(terminal);
     }
-    let restored = ratatui::try_restore();
-    match shown.and(restored.map_err(TopError::from)) {
+    match shown.and(ratatui::try_restore().map_err(TopError::from)) {
         Err(TopError::Terminal(_)) if signals.came() || is_closed() => Ok(()),
         shown => shown,
     }
@@ -97,8 +96,7 @@ fn run(
     signals: &mut Signals,
     terminal: &mut DefaultTerminal,
 ) -> Result<(), TopError> {
-    let domain = robot.domain();
-    let mut follower = Follower::new(domain, "top", &topics::POSE, ScreenFeed::open)
+    let mut follower = Follower::new(robot.domain(), "top", &topics::POSE, ScreenFeed::open)
         .also_on([&topics::ROSTER as _, &topics::LINK as _]);
     let mut view = View::new(robot.clone());
     let mut operator = Operator::new(robot);

@@ -119,10 +119,8 @@ fn table(view: &View, frame: &mut Frame<'_>, area: Rect) {
         });
         Row::new(cells).style(style)
     };
-    let heads = row(heads.map(str::to_owned), DIM);
-    let rows = rows.into_iter().map(|(texts, style)| row(texts, style));
-    let table = Table::new(rows, widths)
-        .header(heads)
+    let table = Table::new(rows.into_iter().map(|(texts, style)| row(texts, style)), widths)
+        .header(row(heads.map(str::to_owned), DIM))
         .column_spacing(1)
         .highlight_symbol("> ")
         .row_highlight_style(Style::new().add_modifier(Modifier::REVERSED));

@@ -75,8 +75,7 @@ impl Listed {
         let bus = roster::join(&domain, "list")?;
         let (is_mirror, mut ages) = (domain.mirrors().is_some(), bus.reader(&topics::MIRROR)?);
         Roster::open(&bus)?.find(PATIENCE, |header, _| {
-            let age_s = ages.newest().ok().flatten().map(|mirror| mirror.age_s());
-            self.age_s = age_s.or(self.age_s);
+            self.age_s = ages.newest().ok().flatten().map(|mirror| mirror.age_s()).or(self.age_s);
             if is_mirror && self.age_s.is_none() {
                 return None;
             }

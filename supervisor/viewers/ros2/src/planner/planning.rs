@@ -82,8 +82,7 @@ impl Planner {
             let leg = self.leg(map, [from, to], cancellation)?;
             // The last position may be anywhere in the goal's cell.
             let next = leg.iter().skip(1).take(leg.len().saturating_sub(2)).chain([&to]);
-            let ahead = leg.iter().zip(next).map(|(at, to)| [at.x, at.y, (to - at).to_angle()]);
-            path.extend(ahead);
+            path.extend(leg.iter().zip(next).map(|(at, to)| [at.x, at.y, (to - at).to_angle()]));
             ends.push(path.len());
             path.push([to.x, to.y, goal.matrix2.x_axis.to_angle()]);
             from = to;
