@@ -13,61 +13,6 @@ const MOST_IN_FLIGHT: usize = 1024;
 /// Maximum wait of a datagram to follow or join the next.
 const LONGEST_HOLD_S: f64 = 0.5;
 
-/// Good and outage periods of exponentially distributed duration.
-#[derive(Clone, Debug)]
-struct Fading {
-    mean_good: f64,
-    mean_out: f64,
-    longest: f64,
-    out: bool,
-    since: f64,
-    until: f64,
-    longest_seen: f64,
-}
-
-impl Fading {
-    fn new(radio: &mission::Radio, noise: &mut Noise) -> Self {
-        let (mean, longest) = (radio.outage_mean_s, radio.outage_max_s);
-        // Truncating the longest outages shortens their mean, but the share must stay.
-        let cut_mean = mean * (1.0 - (-longest / mean).exp());
-        let share = radio.outage_share;
-        let mean_good = if share > 0.0 { cut_mean * (1.0 - share) / share } else { f64::INFINITY };
-        let until =
-            if mean_good.is_finite() { noise.exponential(mean_good) } else { f64::INFINITY };
-        Self {
-            mean_good,
-            mean_out: mean,
-            longest,
-            out: false,
-            since: 0.0,
-            until,
-            longest_seen: 0.0,
-        }
-    }
-
-    /// Requires mission time `now` never to decrease.
-    fn is_out(&mut self, now: f64, noise: &mut Noise) -> bool {
-        while now >= self.until {
-            self.out = !self.out;
-            self.since = self.until;
-            self.until += if self.out {
-                // A minimum lets time pass even for a mean of 0.
-                noise.exponential(self.mean_out).clamp(1e-3, self.longest.max(1e-3))
-            } else {
-                noise.exponential(self.mean_good).max(1e-3)
-            };
-            assert!(self.until > self.since);
-            if self.out && self.until <= now {
-                self.longest_seen = self.longest_seen.max(self.until - self.since);
-            }
-        }
-        if self.out {
-            self.longest_seen = self.longest_seen.max(now - self.since);
-        }
-        self.out
-    }
-}
-
 #[derive(Clone, Debug)]
 struct Flight<W> {
     due: f64,
@@ -83,11 +28,17 @@ enum Hold {
 }
 
 /// Simulated radio; `W` is a datagram's direction and peer.
+///
+/// Good and outage periods are of exponentially distributed duration.
 #[derive(Clone, Debug)]
 pub struct Radio<W> {
     settings: mission::Radio,
     noise: Noise,
-    fading: Fading,
+    mean_good: f64,
+    out: bool,
+    since: f64,
+    until: f64,
+    longest_outage_s: f64,
     in_flight: VecDeque<Flight<W>>,
     sent: u64,
     lost: u64,
@@ -97,10 +48,21 @@ pub struct Radio<W> {
 impl<W: Copy + PartialEq> Radio<W> {
     pub fn new(settings: mission::Radio, seed: u64) -> Self {
         let mut noise = Noise::new(seed, Source::Radio);
+        let mission::Radio { outage_share: share, outage_mean_s: mean, outage_max_s, .. } =
+            settings;
+        // Truncating the longest outages shortens their mean, but the share must stay.
+        let cut_mean = mean * (1.0 - (-outage_max_s / mean).exp());
+        let mean_good = if share > 0.0 { cut_mean * (1.0 - share) / share } else { f64::INFINITY };
+        let until =
+            if mean_good.is_finite() { noise.exponential(mean_good) } else { f64::INFINITY };
         Self {
-            fading: Fading::new(&settings, &mut noise),
             settings,
             noise,
+            mean_good,
+            out: false,
+            since: 0.0,
+            until,
+            longest_outage_s: 0.0,
             in_flight: VecDeque::new(),
             sent: 0,
             lost: 0,
@@ -124,9 +86,32 @@ impl<W: Copy + PartialEq> Radio<W> {
         .all(|share| *share == 0.0)
     }
 
+    /// Requires mission time `now` never to decrease.
+    fn is_out(&mut self, now: f64) -> bool {
+        while now >= self.until {
+            self.out = !self.out;
+            self.since = self.until;
+            self.until += if self.out {
+                // A minimum lets time pass even for a mean of 0.
+                let outage_s = self.noise.exponential(self.settings.outage_mean_s);
+                outage_s.clamp(1e-3, self.settings.outage_max_s)
+            } else {
+                self.noise.exponential(self.mean_good).max(1e-3)
+            };
+            assert!(self.until > self.since);
+            if self.out && self.until <= now {
+                self.longest_outage_s = self.longest_outage_s.max(self.until - self.since);
+            }
+        }
+        if self.out {
+            self.longest_outage_s = self.longest_outage_s.max(now - self.since);
+        }
+        self.out
+    }
+
     pub fn loses(&mut self, now: f64) -> bool {
         self.sent += 1;
-        let out = self.fading.is_out(now, &mut self.noise);
+        let out = self.is_out(now);
         let lost = self.noise.chance(self.settings.loss_share) || out;
         self.lost += u64::from(lost);
         lost
@@ -223,10 +208,10 @@ impl<W: Copy + PartialEq> Radio<W> {
 
     pub fn ground_truth(&mut self, now: f64) -> GroundTruthRadio {
         GroundTruthRadio {
-            out: self.fading.is_out(now, &mut self.noise),
+            out: self.is_out(now),
             sent: self.sent,
             lost: self.lost,
-            longest_outage_s: self.fading.longest_seen,
+            longest_outage_s: self.longest_outage_s,
             missed_ticks: self.missed_ticks,
         }
     }
