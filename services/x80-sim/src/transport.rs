@@ -3,13 +3,11 @@
 mod memory;
 mod owner;
 mod pty;
-mod source;
 mod tcp;
 mod udp;
 
 use std::{io, net::SocketAddr, os::fd::BorrowedFd, sync::mpsc::Sender};
 
-pub(crate) use self::source::Source;
 use crate::error::{Result, SimError};
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -20,6 +18,24 @@ pub enum Transport {
     Tcp,
     /// Pseudo-terminal, opened by its path like a serial port.
     Pty,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Source {
+    Peer(SocketAddr),
+    Connection(u64),
+    Line,
+}
+
+impl Source {
+    /// Returns whether both are one host; it may use another port after a restart.
+    pub(crate) fn is_same_host(self, other: Self) -> bool {
+        match (self, other) {
+            (Self::Peer(one), Self::Peer(other)) => one.ip() == other.ip(),
+            // Connections follow each other, and a line has one end.
+            _ => true,
+        }
+    }
 }
 
 trait Wire {

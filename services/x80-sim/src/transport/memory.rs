@@ -7,7 +7,7 @@ use std::{
     sync::mpsc::Sender,
 };
 
-use super::{Wire, source::Source, udp::LONGEST};
+use super::{Source, Wire, udp::LONGEST};
 
 impl Wire for Sender<(SocketAddr, Vec<u8>)> {
     fn address(&self) -> String {

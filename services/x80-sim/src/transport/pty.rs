@@ -12,7 +12,7 @@ use rustix::{
     termios::{ControlModes, OptionalActions, Termios, tcgetattr, tcsetattr},
 };
 
-use super::{Wire, source::Source};
+use super::{Source, Wire};
 
 /// Speed that the robot sets. A host sets its own when it opens the line, which reveals the
 /// opening.

@@ -6,7 +6,7 @@ use std::{
     os::fd::{AsFd, BorrowedFd},
 };
 
-use super::{Wire, source::Source};
+use super::{Source, Wire};
 
 #[derive(Debug)]
 pub(crate) struct Tcp {

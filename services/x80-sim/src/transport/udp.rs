@@ -4,7 +4,7 @@ use std::{
     os::fd::{AsFd, BorrowedFd},
 };
 
-use super::{Wire, owner::OwnUser, source::Source};
+use super::{Source, Wire, owner::OwnUser};
 
 /// Maximum datagram, below UDP's limit of 65,507 bytes. Lines with a scan of thousands of beams
 /// take several.
