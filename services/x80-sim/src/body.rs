@@ -12,6 +12,7 @@ use crate::world::{Surface, World};
 const RELEASE_M: f64 = 0.005;
 /// Maximum pushes out of obstacles; corners take two.
 const PUSHES: usize = 4;
+const NOTHING: (f64, Option<DVec2>) = (f64::INFINITY, None);
 
 #[derive(Clone, Debug)]
 pub struct Body {
@@ -44,21 +45,21 @@ impl Body {
             over_hole: false,
             contacts: 0,
         };
-        it.clearance = it.clearance_in(world);
+        (it.clearance, _) = it.nearest(world);
         it
     }
 
     pub fn put(&mut self, pose: Pose2, contacts: u64, world: &World) {
         self.pose = pose;
         self.contacts = contacts;
-        self.clearance = self.clearance_in(world);
+        (self.clearance, _) = self.nearest(world);
         self.touching = self.clearance <= RELEASE_M;
     }
 
     /// Radians counter-clockwise from the body's axis.
     pub fn touched_at(&self, world: &World) -> Option<f64> {
         let is_near = self.clearance <= RELEASE_M;
-        let (_, outward) = is_near.then(|| self.nearest(world)).flatten()?;
+        let (_, outward) = is_near.then(|| self.nearest(world))?;
         Some(self.pose.axis().angle_to(-outward?))
     }
 
@@ -96,7 +97,7 @@ impl Body {
         let before = self.pose;
         self.pose.position += shove.velocity_m_s * dt;
         self.pose.heading += shove.turn_deg_s.to_radians() * dt;
-        let clearance = self.clearance_in(world);
+        let (clearance, _) = self.nearest(world);
         if clearance > RELEASE_M {
             self.clearance = clearance;
         } else {
@@ -108,46 +109,42 @@ impl Body {
     /// penetrated any.
     fn leave_things(&mut self, before: Pose2, world: &World) -> bool {
         for push in 0..PUSHES {
-            let nearest = self.nearest(world);
-            self.clearance = nearest.map_or(f64::INFINITY, |(gap, _)| gap);
-            let Some((gap, outward)) = nearest.filter(|(gap, _)| *gap < 0.0) else {
+            let (gap, outward) = self.nearest(world);
+            self.clearance = gap;
+            if gap >= 0.0 {
                 return push > 0;
-            };
+            }
             let Some(outward) = outward else {
                 break;
             };
             // The margin avoids endless penetration by rounding.
             self.pose.position += outward * (1e-9 - gap);
         }
-        self.clearance = self.clearance_in(world);
+        (self.clearance, _) = self.nearest(world);
         if self.clearance < 0.0 {
             self.pose.position = before.position;
             if self.footprint.is_some() {
                 self.pose.heading = before.heading;
             }
-            self.clearance = self.clearance_in(world);
+            (self.clearance, _) = self.nearest(world);
         }
         true
     }
 
-    fn clearance_in(&self, world: &World) -> f64 {
-        self.nearest(world).map_or(f64::INFINITY, |(gap, _)| gap)
-    }
-
     /// Returns the nearest obstacle's distance, negative inside, and direction to the body.
-    fn nearest(&self, world: &World) -> Option<(f64, Option<DVec2>)> {
+    fn nearest(&self, world: &World) -> (f64, Option<DVec2>) {
         let position = self.pose.position;
         let Some(footprint) = self.footprint else {
             let gaps = world.touchable().map(|it| (it.distance(position) - self.radius, it));
             let nearest = gaps.min_by(|(a, _), (b, _)| a.total_cmp(b));
-            return nearest.map(|(gap, surface)| (gap, surface.outward(position)));
+            return nearest.map_or(NOTHING, |(gap, surface)| (gap, surface.outward(position)));
         };
         let axis = self.pose.axis();
         let local = |at: DVec2| DVec2::new(axis.x, -axis.y).rotate(at - position);
-        let mut nearest: Option<(f64, Option<DVec2>)> = None;
+        let mut nearest = NOTHING;
         for surface in world.touchable() {
             let at_least = surface.distance(position) - self.radius;
-            if nearest.is_some_and(|(gap, _)| gap < at_least) {
+            if nearest.0 < at_least {
                 continue;
             }
             let (gap, out) = match surface {
@@ -157,8 +154,8 @@ impl Body {
                 }
                 Surface::Face { from, to } => footprint.gap_to_face(local(from), local(to)),
             };
-            if nearest.is_none_or(|(before, _)| gap < before) {
-                nearest = Some((gap, Some(-axis.rotate(out))));
+            if gap < nearest.0 {
+                nearest = (gap, Some(-axis.rotate(out)));
             }
         }
         nearest
