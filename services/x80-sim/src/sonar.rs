@@ -34,10 +34,8 @@ const POST_RADIUS_M: f64 = 0.015;
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Candidate {
     range: f64,
-    /// Range seen from above, metres.
-    level_range: f64,
-    /// Unit vector from the ranger, seen from above.
-    along: DVec2,
+    /// From the ranger, seen from above, metres.
+    offset: DVec2,
     /// Whether the echo is often lost: near a limit, or from an edge.
     weak: bool,
     share: f64,
@@ -65,9 +63,10 @@ pub fn listen(
         world.solids().flat_map(|solid| receiver.candidates(&solid)).flatten().collect();
     candidates.sort_by(|a, b| a.range.total_cmp(&b.range));
     let answer = candidates.into_iter().find(|candidate| {
+        let Candidate { offset, .. } = *candidate;
         let hidden = world
-            .first_hit(pose.position, candidate.along, height)
-            .is_some_and(|(first, _)| first < candidate.level_range - HIDES_M);
+            .first_hit(pose.position, offset.normalize_or_zero(), height)
+            .is_some_and(|(first, _)| first < offset.length() - HIDES_M);
         !hidden && (candidate.share >= 1.0 || noise.chance(candidate.share))
     });
     let heard = match answer {
@@ -268,13 +267,7 @@ fn amplitude(range: f64, radius: Option<f64>) -> f64 {
 }
 
 fn heard(offset: DVec2, weak: bool) -> Candidate {
-    Candidate {
-        range: offset.length(),
-        level_range: offset.length(),
-        along: offset.normalize_or_zero(),
-        weak,
-        share: 1.0,
-    }
+    Candidate { range: offset.length(), offset, weak, share: 1.0 }
 }
 
 #[cfg(test)]
