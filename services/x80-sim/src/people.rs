@@ -56,12 +56,8 @@ struct Walker {
     left_s: f64,
 }
 
-#[derive(Clone, Copy, Debug)]
-struct Other {
-    at: DVec2,
-    velocity: DVec2,
-    radius: f64,
-}
+/// Place, velocity and radius of a body.
+type Other = (DVec2, DVec2, f64);
 
 impl People {
     pub(crate) fn new(people: &[Person]) -> Self {
@@ -84,13 +80,9 @@ impl People {
         const { assert!(LONGEST_S < RELAXES_S) };
         let steps = (for_s / LONGEST_S).ceil();
         let dt = for_s / steps;
-        let robot = Other { at: robot, velocity: (robot - from) / for_s, radius };
+        let robot = (robot, (robot - from) / for_s, radius);
         for _ in 0..steps as usize {
-            let other = |it: &Walker| Other {
-                at: it.at,
-                velocity: it.velocity,
-                radius: it.person.radius_m,
-            };
+            let other = |it: &Walker| (it.at, it.velocity, it.person.radius_m);
             let others: Vec<_> = self.walkers.iter().map(other).collect();
             for (own, walker) in self.walkers.iter_mut().enumerate() {
                 let others = others.iter().enumerate().filter(|(other, _)| *other != own);
@@ -123,7 +115,7 @@ impl Walker {
         let wants = (*goal - self.at).normalize_or_zero();
         let mut force = (self.person.speed_m_s * wants - self.velocity) / RELAXES_S;
         let mut before: Vec<DVec2> = Vec::new();
-        for Other { at, velocity, radius } in others {
+        for (at, velocity, radius) in others {
             let both_m = radius + self.person.radius_m;
             let offset = self.at - at;
             let repelled = by_another(offset, STEP_S * velocity, both_m);
