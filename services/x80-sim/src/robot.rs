@@ -29,7 +29,7 @@ use crate::{
     sensors::{self, Ranging},
     streams::Streams,
     wheel_errors::WheelErrors,
-    world::{Other, World},
+    world::World,
 };
 
 const STEP_S: f64 = 0.005;
@@ -90,7 +90,7 @@ pub struct Robot {
     car: Option<Car>,
     longest_step: f64,
 
-    world: World,
+    pub(crate) world: World,
     body: Body,
     motors: [Motor; 6],
     streams: Streams,
@@ -228,10 +228,6 @@ impl Robot {
     fn is_moving(&self) -> bool {
         let ordered = self.motors.iter().any(|motor| motor.ends_at().is_some());
         ordered || self.rims() != [0.0; 2]
-    }
-
-    pub fn meet(&mut self, other: Option<Other>) {
-        self.world.other = other;
     }
 
     pub fn next_tick_s(&self) -> f64 {

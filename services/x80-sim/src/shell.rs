@@ -105,11 +105,14 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result {
     let mut session = Session::new(&mission, robot, pace, ways, ground_truth, others)?;
     let mut buffer = vec![0; 65_536];
     loop {
-        let [came, stopped] = wait(&session, &stop)?;
-        if stopped {
+        let mut descriptors = session.readable();
+        descriptors.push(stop.as_fd());
+        let came = poll::readable(&descriptors, session.patience());
+        let mut came = came.map_err(SimError::Wait)?;
+        if came.pop() == Some(true) {
             return session.end();
         }
-        if came {
+        if came.contains(&true) {
             session.listen(&mut buffer)?;
         }
         session.catch_up()?;
@@ -127,15 +130,6 @@ fn tell(reader: &mut Option<Box<dyn Write + Send>>, record: &impl Serialize) {
         tracing::warn!(%error, "the ground truth has lost its reader; the robot continues without one");
         *reader = None;
     }
-}
-
-fn wait(session: &Session, stop: &impl AsFd) -> Result<[bool; 2]> {
-    let mut descriptors = session.readable();
-    descriptors.push(stop.as_fd());
-    let came = poll::readable(&descriptors, session.patience());
-    let mut came = came.map_err(SimError::Wait)?;
-    let stopped = came.pop().unwrap_or_default();
-    Ok([came.contains(&true), stopped])
 }
 
 /// None in lockstep.
@@ -156,10 +150,6 @@ impl SimClock {
             }
         };
         Self { runs, period_s }
-    }
-
-    const fn is_lock_step(&self) -> bool {
-        self.runs.is_none()
     }
 
     fn now(&self, machine_ns: u64) -> Option<f64> {

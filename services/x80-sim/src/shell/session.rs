@@ -218,7 +218,7 @@ impl Session {
 
     fn meet(&mut self) -> Result {
         if let Some(meeting) = &mut self.meeting {
-            self.robot.meet(meeting.other_at(self.robot.time)?);
+            self.robot.world.other = meeting.other_at(self.robot.time)?;
         }
         Ok(())
     }
@@ -331,7 +331,7 @@ impl Session {
             return Ok(());
         }
         let mut answer = Vec::with_capacity(16);
-        if !self.clock.is_lock_step() {
+        if self.clock.runs.is_some() {
             if said.told(&mut self.robot, &mut answer) != Heard::Foreign {
                 self.peer = Some(source);
                 self.send(&answer);
