@@ -23,7 +23,6 @@ mod load;
 mod machine;
 mod process;
 mod random;
-mod robot;
 mod robot_fault;
 mod surroundings;
 mod wire;
@@ -37,6 +36,7 @@ use common::{
 use mission_control::{Finished, Heard, Options, recovery::RecoveredRun};
 use processes::Starter;
 use summary::{Hearer, Summary};
+use x80_sim::InMemory;
 
 pub use self::{
     disturbance::{Disturbance, Request, What},
@@ -47,7 +47,7 @@ pub use self::{
     robot_fault::{Promise, RobotFault},
     wire::{Quality, Way},
 };
-use self::{machine::SimulatedMachine, robot::Robot, surroundings::Simulated};
+use self::{machine::SimulatedMachine, surroundings::Simulated};
 
 /// Longest run, beyond the timeouts of its targets.
 const LATE: Duration = Duration::from_secs(120);
@@ -153,7 +153,7 @@ impl Scenario {
         machine: &Rc<SimulatedMachine>,
         heard: &Rc<RefCell<Hearer>>,
     ) -> Option<Finished> {
-        let robot = Robot::start(&self.shoved(), self.pace);
+        let robot = InMemory::start(&self.shoved(), self.pace);
         machine.place(machine.or_break_off("the robot starts", robot)?);
         // Each target has its own timeout.
         let is_target =

@@ -38,7 +38,6 @@ use crate::{
     load::Load,
     process::{Process, killed_by},
     random::Random,
-    robot::Robot,
     wire::{HostEnd, Port, Way, Wires},
 };
 
@@ -80,7 +79,7 @@ pub(crate) struct SimulatedMachine {
     files: Files,
     memory: RefCell<Rc<Memory>>,
     wires: Rc<RefCell<Wires>>,
-    robot: RefCell<Option<Robot>>,
+    robot: RefCell<Option<InMemory>>,
     /// `None` for a robot that stays healthy.
     faults: Option<RefCell<FaultInjector>>,
     guard: RefCell<Guard>,
@@ -129,7 +128,7 @@ impl SimulatedMachine {
         Duration::from_nanos(self.monotonic_ns() - BEGIN_NS)
     }
 
-    pub(crate) fn place(&self, robot: Robot) {
+    pub(crate) fn place(&self, robot: InMemory) {
         self.robot.replace(Some(robot));
     }
 
@@ -285,7 +284,7 @@ impl SimulatedMachine {
             (disturbs, Event::Disturbance),
             (wires.next_ns(Way::ToRobot), Event::ToRobot),
             (wires.next_ns(Way::ToHost), Event::ToHost),
-            (self.robot.borrow().as_ref().and_then(|it| it.simulated.next_due_ns()), Event::Robot),
+            (self.robot.borrow().as_ref().and_then(InMemory::next_due_ns), Event::Robot),
             (self.guard.borrow().due_ns, Event::Guard),
         ];
         let processes = self.processes.borrow();
@@ -363,11 +362,10 @@ impl SimulatedMachine {
     fn with_robot(&self, act: impl FnOnce(&mut InMemory) -> Result<(), SimError>) {
         let mut robot = self.robot.borrow_mut();
         let Some(robot) = &mut *robot else { return };
-        self.or_break_off("the robot runs", act(&mut robot.simulated));
-        robot.observe();
+        self.or_break_off("the robot runs", act(robot));
         let mut wires = self.wires.borrow_mut();
         let lane = wires.lane(Way::ToHost);
-        for (to, datagram) in robot.simulated.sent() {
+        for (to, datagram) in robot.sent() {
             let to = to.port();
             let Some(faults) = &self.faults else {
                 lane.send(to, &datagram, self.monotonic_ns());

@@ -22,19 +22,20 @@ use crate::{
 pub struct InMemory {
     session: Session,
     sent: Receiver<(SocketAddr, Vec<u8>)>,
-    truth: Receiver<GroundTruthTick>,
+    told: Receiver<GroundTruthTick>,
+    pub truth: Vec<GroundTruthTick>,
 }
 
 impl InMemory {
     pub fn start(mission: &Mission, pace: Pace) -> Result<Self> {
-        let ((host, sent), (told, truth)) = (channel(), channel());
+        let ((host, sent), (truth, told)) = (channel(), channel());
         // Without a reader, the ground truth is lost.
         let tell = Box::new(move |tick| {
-            let _ = told.send(tick);
+            let _ = truth.send(tick);
         });
         let (robot, ways) = (Robot::new(mission), (Way::to(host), None));
         let session = Session::new(mission, robot, pace, ways, tell, (None, None))?;
-        Ok(Self { session, sent, truth })
+        Ok(Self { session, sent, truth: told.try_iter().collect(), told })
     }
 
     /// Takes a datagram of the host's wire at `from`. Each wire needs its own port, as robot and
@@ -46,7 +47,9 @@ impl InMemory {
 
     /// Does nothing in lockstep.
     pub fn pass(&mut self) -> Result {
-        self.session.catch_up()
+        self.session.catch_up()?;
+        self.truth.extend(self.told.try_iter());
+        Ok(())
     }
 
     /// On the monotonic clock; none in lockstep.
@@ -58,9 +61,5 @@ impl InMemory {
     /// Returns the datagrams sent since the last call, each with the wire that receives it.
     pub fn sent(&mut self) -> impl Iterator<Item = (SocketAddr, Vec<u8>)> {
         self.sent.try_iter()
-    }
-
-    pub fn truth(&mut self) -> impl Iterator<Item = GroundTruthTick> {
-        self.truth.try_iter()
     }
 }

@@ -12,7 +12,7 @@ fn lock_step(text: &str, commands: usize) -> (Vec<u8>, Vec<GroundTruthTick>) {
         robot.hear(port(7), &forward(400, 150)).unwrap();
     }
     let bytes = robot.sent().flat_map(|(_, datagram)| datagram).collect();
-    (bytes, robot.truth().collect())
+    (bytes, robot.truth)
 }
 
 #[test]
