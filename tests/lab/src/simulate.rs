@@ -179,7 +179,7 @@ fn run(scenario: &Scenario, arguments: &Arguments) -> Result<Ran> {
 /// Runs `scenario` before `observer`, and returns it too, unless the simulation keeps it.
 pub fn observe<T: Observer + 'static>(scenario: &Scenario, observer: T) -> (Ran, Option<T>) {
     let observer = Rc::new(RefCell::new(observer));
-    let ran = scenario.run_before(Some(Box::new(Rc::clone(&observer))));
+    let ran = scenario.run_before(Some(observer.clone()));
     (ran, Rc::into_inner(observer).map(RefCell::into_inner))
 }
 

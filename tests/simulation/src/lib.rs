@@ -117,8 +117,8 @@ impl Scenario {
         self.run_before(None)
     }
 
-    /// Runs the scenario before an observer.
-    pub fn run_before(&self, observer: Option<Box<dyn Observer>>) -> Ran {
+    /// Runs the scenario before an observer, which its owner reads after the run.
+    pub fn run_before(&self, observer: Option<Rc<RefCell<dyn Observer>>>) -> Ran {
         let heard = Rc::<RefCell<Hearer>>::default();
         let machine = SimulatedMachine::new(self, observer);
         let finished = common::machine::simulate(Rc::<SimulatedMachine>::clone(&machine), || {
@@ -228,21 +228,6 @@ pub trait Observer {
     }
 }
 
-/// A shared observer, which its owner reads after the run.
-impl<T: Observer> Observer for Rc<RefCell<T>> {
-    fn on_bus(&mut self, bus: &Bus) {
-        self.borrow_mut().on_bus(bus);
-    }
-
-    fn observe(&mut self) {
-        self.borrow_mut().observe();
-    }
-
-    fn turn(&mut self, stage: &str, turn: &mut dyn FnMut()) {
-        self.borrow_mut().turn(stage, turn);
-    }
-}
-
 /// What came of a run.
 pub struct Ran {
     /// `None` if an invariant broke or the scenario ended.
@@ -294,13 +279,13 @@ mod tests {
 
     #[test]
     fn a_seed_gives_the_same_events_watched_or_not_and_another_others() {
-        let run = |seed, observer: Option<Box<dyn Observer>>| {
+        let run = |seed, observer: Option<Rc<RefCell<dyn Observer>>>| {
             let ran = Scenario::draw(&mission(), seed).run_before(observer);
             assert!(ran.broken.is_none(), "seed {seed}: {:?}", ran.broken);
             (ran.events, ran.truth)
         };
         let [first, second, _] = [7, 8, 9].map(|seed| {
-            let watched = run(seed, Some(Box::new(Viewer::default())));
+            let watched = run(seed, Some(Rc::<RefCell<Viewer>>::default()));
             assert_eq!(watched, run(seed, None), "{seed}");
             watched
         });

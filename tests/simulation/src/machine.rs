@@ -89,7 +89,7 @@ pub(crate) struct SimulatedMachine {
     /// The soonest last.
     disturbances: RefCell<Vec<Disturbance>>,
     invariants: RefCell<Invariants>,
-    observer: RefCell<Option<Box<dyn Observer>>>,
+    observer: Option<Rc<RefCell<dyn Observer>>>,
     broken: RefCell<Option<Broken>>,
     is_ended: Cell<bool>,
     events: Cell<u64>,
@@ -98,7 +98,10 @@ pub(crate) struct SimulatedMachine {
 }
 
 impl SimulatedMachine {
-    pub(crate) fn new(scenario: &Scenario, observer: Option<Box<dyn Observer>>) -> Rc<Self> {
+    pub(crate) fn new(
+        scenario: &Scenario,
+        observer: Option<Rc<RefCell<dyn Observer>>>,
+    ) -> Rc<Self> {
         let Scenario { seed, load, .. } = *scenario;
         let mut disturbances = scenario.disturbances.clone();
         disturbances.sort_by_key(|disturbance| std::cmp::Reverse(disturbance.at));
@@ -119,7 +122,7 @@ impl SimulatedMachine {
             load,
             disturbances: RefCell::new(disturbances),
             invariants: RefCell::new(invariants),
-            observer: RefCell::new(observer),
+            observer,
             ..Self::default()
         })
     }
@@ -184,7 +187,7 @@ impl SimulatedMachine {
     /// Begins the life of a supervisor, with a new bus. Returns the bus.
     pub(crate) fn start_supervisor(&self) -> Bus {
         let process = self.new_process();
-        self.supervisors.set(self.supervisors.get() + 1);
+        self.supervisors.update(|supervisors| supervisors + 1);
         self.supervisor.set(process);
         self.running.set(process);
         self.new_bus()
@@ -195,8 +198,8 @@ impl SimulatedMachine {
         let memory = Rc::<Memory>::default();
         self.memory.replace(Rc::clone(&memory));
         self.invariants.borrow_mut().on_bus(&memory);
-        if let Some(observer) = &mut *self.observer.borrow_mut() {
-            observer.on_bus(&Bus::in_memory(Rc::clone(&memory), None));
+        if let Some(observer) = &self.observer {
+            observer.borrow_mut().on_bus(&Bus::in_memory(Rc::clone(&memory), None));
         }
         Bus::in_memory(memory, Some(self.supervisor.get()))
     }
@@ -219,7 +222,7 @@ impl SimulatedMachine {
     }
 
     fn new_process(&self) -> u32 {
-        self.processes_started.set(self.processes_started.get() + 1);
+        self.processes_started.update(|started| started + 1);
         FIRST_PROCESS + self.processes_started.get()
     }
 
@@ -318,7 +321,7 @@ impl SimulatedMachine {
 
     fn execute(&self, event: &Event) {
         let before = self.running.replace(OBSERVER);
-        self.events.set(self.events.get() + 1);
+        self.events.update(|events| events + 1);
         let (second, since) = self.second.get();
         if second != self.now().as_secs() {
             self.second.set((self.now().as_secs(), self.events.get()));
@@ -352,8 +355,8 @@ impl SimulatedMachine {
         }
         self.wake();
         self.running.set(OBSERVER);
-        if let Some(observer) = &mut *self.observer.borrow_mut() {
-            observer.observe();
+        if let Some(observer) = &self.observer {
+            observer.borrow_mut().observe();
         }
         self.judge(self.invariants.borrow_mut().check(self));
         self.running.set(before);
@@ -450,10 +453,11 @@ impl SimulatedMachine {
                 turned
             }),
             (Some(turns), _) if process.is_terminated => turns.stop().map(|()| None),
-            (Some(turns), _) => match &mut *self.observer.borrow_mut() {
+            (Some(turns), _) => match &self.observer {
                 Some(observer) => {
                     let mut turned = Ok(None);
-                    observer.turn(process.stage, &mut || turned = turns.turn());
+                    let mut turn = || turned = turns.turn();
+                    observer.borrow_mut().turn(process.stage, &mut turn);
                     turned
                 }
                 None => turns.turn(),

@@ -21,7 +21,7 @@ impl Observer for Counter {
 fn a_tick_of_the_link_allocates_at_most_60_times_and_one_of_the_planner_40_times() {
     let counter = Rc::new(RefCell::new(Counter::default()));
     let scenario = Scenario::lockstep(&missions::load("obstacle-course", &[]).unwrap());
-    let ran = scenario.run_before(Some(Box::new(Rc::clone(&counter))));
+    let ran = scenario.run_before(Some(counter.clone()));
     let (ticks, Counter(found)) = (ran.summary.unwrap().ticks, counter.take());
     let [link, planner] = ["link", "planner"].map(|stage| found[stage] / ticks);
     assert!(link <= 60 && planner <= 40, "{found:?} in {ticks} ticks");

@@ -47,7 +47,7 @@ fn ran_text(text: &str, disturbances: &[Disturbance], while_waiting: &[Request])
 }
 
 fn ran_before(
-    observer: Option<Box<dyn Observer>>,
+    observer: Option<Rc<RefCell<dyn Observer>>>,
     text: &str,
     disturbances: &[Disturbance],
     while_waiting: &[Request],
@@ -363,7 +363,7 @@ impl Observer for Orders {
 fn answers(keys: &str, asked: &[Disturbance]) -> Vec<RequestAnswer> {
     let text = format!("target = [4, 0]\ntimeout_s = 120\nperimeter.width_m = 9\n{keys}");
     let orders = Rc::new(RefCell::new(Orders::default()));
-    ran_before(Some(Box::new(Rc::clone(&orders))), &text, asked, &[]);
+    ran_before(Some(orders.clone()), &text, asked, &[]);
     orders.take().answers
 }
 
