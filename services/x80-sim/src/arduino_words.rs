@@ -51,12 +51,12 @@ impl Request {
 }
 
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Requests {
+pub struct Requests {
     held: Vec<u8>,
 }
 
 impl Requests {
-    pub(crate) fn push(&mut self, bytes: &[u8]) -> Vec<Request> {
+    pub fn push(&mut self, bytes: &[u8]) -> Vec<Request> {
         let mut complete = Vec::new();
         for byte in bytes {
             if *byte == b'\r' {
@@ -70,7 +70,7 @@ impl Requests {
 }
 
 #[derive(Clone, Debug)]
-pub(crate) struct ArduinoWords {
+pub struct ArduinoWords {
     board: ArduinoBoard,
     wheels: [OnChannel; 2],
     sonars: Vec<(i32, usize)>,
@@ -81,7 +81,7 @@ pub(crate) struct ArduinoWords {
 }
 
 impl ArduinoWords {
-    pub(crate) fn new(mission: &Mission) -> Self {
+    pub fn new(mission: &Mission) -> Self {
         let pins = &mission.robot.arduino.sonars;
         let table = mission.sensor_table().into_iter();
         let pin = |name: &String| pins.get(name).copied().map(i32::from);
@@ -96,12 +96,12 @@ impl ArduinoWords {
         }
     }
 
-    pub(crate) fn boot(&mut self, now: f64) {
+    pub fn boot(&mut self, now: f64) {
         self.boots_until = Some(now + BOOTS_S);
     }
 
     /// Returns whether the board is up; a rebooted one counts from 0.
-    pub(crate) fn hears(&mut self, now: f64, motors: &[Motor; 6]) -> bool {
+    pub fn hears(&mut self, now: f64, motors: &[Motor; 6]) -> bool {
         if self.boots_until.is_some_and(|until| now < until) {
             return false;
         }
@@ -111,7 +111,7 @@ impl ArduinoWords {
         true
     }
 
-    pub(crate) fn answer(
+    pub fn answer(
         &mut self,
         request: Request,
         sensors: &StandardSensors,
@@ -146,7 +146,7 @@ impl ArduinoWords {
         (text + "\r\n", command)
     }
 
-    pub(crate) fn counts(&self, motors: &[Motor; 6]) -> [i32; 2] {
+    pub fn counts(&self, motors: &[Motor; 6]) -> [i32; 2] {
         let turned = self.turned(motors);
         [0, 1].map(|wheel| (turned[wheel] - self.zero[wheel]).round() as i64 as i32)
     }

@@ -15,7 +15,7 @@ use crate::{
 };
 
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Car {
+pub struct Car {
     drive: Ackermann,
     steering: Steering,
     driven: OnChannel,
@@ -26,7 +26,7 @@ pub(crate) struct Car {
 impl Car {
     /// Applies the `errors` of a left wheel and a track to driven wheel and wheelbase; none for
     /// other robots.
-    pub(crate) fn new(mission: &Mission, errors: &WheelErrors) -> Option<Self> {
+    pub fn new(mission: &Mission, errors: &WheelErrors) -> Option<Self> {
         let body = mission.body();
         let steering = body.steering?;
         let [driven, steered] = OnChannel::left_and_right(&mission.robot);
@@ -43,12 +43,12 @@ impl Car {
         })
     }
 
-    pub(crate) const fn steers_by(&self, channel: usize) -> bool {
+    pub const fn steers_by(&self, channel: usize) -> bool {
         self.steered.channel == channel
     }
 
     /// In counts per second.
-    pub(crate) fn top_steering_counts(&self) -> f64 {
+    pub fn top_steering_counts(&self) -> f64 {
         self.steering.counts(self.steering.rate_rad_s)
     }
 
@@ -56,13 +56,13 @@ impl Car {
         self.steering.angle(self.steered.turned(motors))
     }
 
-    pub(crate) fn twist(&self, motors: &[Motor; 6]) -> Twist {
+    pub fn twist(&self, motors: &[Motor; 6]) -> Twist {
         let OnChannel { channel, sign } = self.driven;
         let wheel = sign * motors[channel].speed / self.counts_per_radian;
         self.drive.twist([wheel, self.angle(motors)])
     }
 
-    pub(crate) fn step(
+    pub fn step(
         &self,
         motors: &mut [Motor; 6],
         body: &mut Body,

@@ -3,7 +3,7 @@ use std::{io, net::SocketAddr, path::PathBuf};
 use common::checkpoint::CheckpointError;
 use thiserror::Error;
 
-pub(crate) type Result<T = (), E = SimError> = std::result::Result<T, E>;
+pub type Result<T = (), E = SimError> = std::result::Result<T, E>;
 
 #[derive(Debug, Error)]
 pub enum SimError {

@@ -5,7 +5,7 @@ use common::{geometry::wrap_angle, mission::Mission};
 use crate::noise::{Noise, Source};
 
 #[derive(Clone, Debug)]
-pub(crate) struct Gyro {
+pub struct Gyro {
     noise_rad_sqrt_s: f64,
     bias_rad_s: f64,
     scale: f64,
@@ -17,7 +17,7 @@ pub(crate) struct Gyro {
 impl Gyro {
     /// Draws bias and scale, which belong to the robot, from the mission's seed; `seed` sets the
     /// noise.
-    pub(crate) fn new(mission: &Mission, seed: u64) -> Self {
+    pub fn new(mission: &Mission, seed: u64) -> Self {
         let physics = mission.simulation.physics().gyro;
         let mut errors = Noise::of_nth(mission.seed, Source::Gyro, 1);
         Self {
@@ -30,7 +30,7 @@ impl Gyro {
         }
     }
 
-    pub(crate) fn read(&mut self, time_s: f64, heading: f64) -> f64 {
+    pub fn read(&mut self, time_s: f64, heading: f64) -> f64 {
         if let Some((before_s, before)) = self.newest.replace((time_s, heading)) {
             let passed_s = time_s - before_s;
             self.angle += self.scale * wrap_angle(heading - before)

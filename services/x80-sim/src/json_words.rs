@@ -19,7 +19,7 @@ use crate::{
 };
 
 #[derive(Clone, Debug)]
-pub(crate) struct JsonWords {
+pub struct JsonWords {
     wheels: [OnChannel; 2],
     held_current_ad: f64,
     counts_per_radian: f64,
@@ -28,7 +28,7 @@ pub(crate) struct JsonWords {
 }
 
 impl JsonWords {
-    pub(crate) fn new(mission: &Mission) -> Self {
+    pub fn new(mission: &Mission) -> Self {
         Self {
             // The firmware assumes the usual wiring; the mission's is the real one.
             wheels: OnChannel::left_and_right(&RobotConfig::default()),
@@ -39,7 +39,7 @@ impl JsonWords {
         }
     }
 
-    pub(crate) fn commands(&mut self, order: &Order) -> Vec<Command> {
+    pub fn commands(&mut self, order: &Order) -> Vec<Command> {
         self.heard += 1;
         let channels = self.wheels.map(|wheel| wheel.channel as u8);
         match *order {
@@ -57,11 +57,11 @@ impl JsonWords {
         }
     }
 
-    pub(crate) fn acknowledgement(&self) -> Vec<u8> {
+    pub fn acknowledgement(&self) -> Vec<u8> {
         line(&Report { heard: Some(self.heard), ..Report::default() })
     }
 
-    pub(crate) fn report(
+    pub fn report(
         &self,
         (standard, custom, motor): (&StandardSensors, &CustomSensors, &MotorSensors),
         lasers: &[Laser],

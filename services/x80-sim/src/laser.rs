@@ -33,7 +33,7 @@ const GLASS_LIMIT_DEG: f64 = 5.0;
 const FASTEST_M_S: f64 = 5.0;
 
 #[derive(Clone, Debug)]
-pub(crate) struct Laser {
+pub struct Laser {
     pub sensor: Sensor,
     height_m: f64,
     timing: LaserTiming,
@@ -46,14 +46,14 @@ pub(crate) struct Laser {
 
 impl Laser {
     /// Creates the lasers whose scans come with the robot's frames.
-    pub(crate) fn all(mission: &Mission, seed: u64) -> Vec<Self> {
+    pub fn all(mission: &Mission, seed: u64) -> Vec<Self> {
         let (lasers, physics) = (mission.lasers_of_base(), mission.simulation.physics());
         let laser = |(nth, (_, sensor))| Self::new(sensor, &physics, (seed, nth));
         lasers.into_iter().enumerate().map(laser).collect()
     }
 
     /// Creates a laser that sends each measurement itself, up to a tick late.
-    pub(crate) fn with_own_wire(sensor: Sensor, mission: &Mission, seed: u64) -> Self {
+    pub fn with_own_wire(sensor: Sensor, mission: &Mission, seed: u64) -> Self {
         let mut physics = mission.simulation.physics();
         physics.laser.delay_s = 0.0;
         physics.laser.sweep_s = 1.0 / mission.robot.rate_hz;
@@ -68,21 +68,21 @@ impl Laser {
         Self { sensor, height_m, timing, poses: VecDeque::new(), noise, scan: Vec::new() }
     }
 
-    pub(crate) fn measure(&mut self, world: &World, pose: Pose2, (tick, time): (u64, f64)) {
+    pub fn measure(&mut self, world: &World, pose: Pose2, (tick, time): (u64, f64)) {
         self.scan = match tick.is_multiple_of(self.sensor.every_ticks) {
             true => self.scan(world, pose, time),
             false => Vec::new(),
         };
     }
 
-    pub(crate) fn said(&self) -> Option<Scan> {
+    pub fn said(&self) -> Option<Scan> {
         let LaserTiming { delay_s, sweep_s, stated_share } = self.timing;
         let stated = [delay_s + sweep_s, sweep_s].map(|seconds| stated_share * seconds);
         let [age_s, time_s] = stated.map(|seconds| (stated[0] > 0.0).then_some(seconds));
         (!self.scan.is_empty()).then(|| Scan { ranges: self.scan.clone(), age_s, time_s })
     }
 
-    pub(crate) fn follow(&mut self, time: f64, pose: Pose2) {
+    pub fn follow(&mut self, time: f64, pose: Pose2) {
         let oldest = time - self.timing.delay_s - self.timing.sweep_s;
         while self.poses.get(1).is_some_and(|(at, _)| *at <= oldest) {
             self.poses.pop_front();
@@ -101,7 +101,7 @@ impl Laser {
         Some(self.poses.get(later).or(self.poses.back())?.1)
     }
 
-    pub(crate) fn near(&self, world: &World, pose: Pose2) -> Vec<Solid> {
+    pub fn near(&self, world: &World, pose: Pose2) -> Vec<Solid> {
         let position = self.sensor.mount.on(pose).position;
         let reach_m = self.sensor.reach_m + self.went_m();
         world.near(position, reach_m, self.height_m, self.sensor.model.rise())
@@ -111,7 +111,7 @@ impl Laser {
         (self.timing.delay_s + self.timing.sweep_s) * FASTEST_M_S
     }
 
-    pub(crate) fn scan(&mut self, world: &World, pose: Pose2, time: f64) -> Vec<Option<f32>> {
+    pub fn scan(&mut self, world: &World, pose: Pose2, time: f64) -> Vec<Option<f32>> {
         let mount = self.sensor.mount.on(pose);
         let (first, step) = self.sensor.fan();
         let near = self.near(world, pose);
@@ -128,7 +128,7 @@ impl Laser {
     }
 
     /// Returns a beam's reading at an angle clockwise from the laser's front, radians.
-    pub(crate) fn clockwise(&mut self, near: &[Solid], time: f64, angle: f64) -> Option<f32> {
+    pub fn clockwise(&mut self, near: &[Solid], time: f64, angle: f64) -> Option<f32> {
         let mount = self.sensor.mount.on(self.pose_at(time)?);
         let angle = if self.sensor.is_upside_down { angle } else { -angle };
         self.reading(near, mount.position, mount.heading + angle)

@@ -2,11 +2,11 @@
 //!
 //! Each module depends only on those before it in this list:
 //!
-//! [`world`], [`body`], [`wheel_errors`], [`motor`], [`sonar`], [`infrared`], `laser`, [`sensors`],
-//! `json_words`, [`arduino_words`], `rplidar`, [`noise`], [`robot`], [`radio`], [`saved_state`],
-//! [`shell`].
+//! `world`, `body`, [`wheel_errors`], `motor`, `sonar`, `infrared`, `laser`, `sensors`,
+//! `json_words`, `arduino_words`, `rplidar`, `noise`, [`robot`], `radio`, `saved_state`,
+//! `shell`.
 //!
-//! Only [`shell`] and its transports use sockets and clocks:
+//! Only `shell` and its transports use sockets and clocks:
 //!
 //! ```
 //! use common::{mission::Mission, wire::{Addressing, Command, Decoder}};
@@ -26,32 +26,34 @@
 //! assert!(robot.ground_truth().x > 0.0);
 //! ```
 
-pub mod arduino_words;
-pub mod body;
+#![allow(unreachable_pub)]
+
+mod arduino_words;
+mod body;
 mod car;
 mod drivetrain;
 mod error;
 mod gyro;
-pub mod infrared;
+mod infrared;
 mod json_words;
 mod laser;
-pub mod motor;
-pub mod noise;
+mod motor;
+mod noise;
 mod people;
-pub mod radio;
+mod radio;
 pub mod robot;
 mod rplidar;
-pub mod saved_state;
-pub mod sensors;
-pub mod shell;
+mod saved_state;
+mod sensors;
+mod shell;
 mod silence;
-pub mod sonar;
+mod sonar;
 mod streams;
 #[cfg(test)]
 mod testing;
 mod transport;
 pub mod wheel_errors;
-pub mod world;
+mod world;
 
 pub use error::SimError;
 pub use shell::{InMemory, SimOptions, run};

@@ -41,7 +41,7 @@ const LONGEST_S: f64 = 0.05;
 const MOST_S: f64 = 60.0;
 
 #[derive(Clone, Debug, Default)]
-pub(crate) struct People {
+pub struct People {
     walkers: Vec<Walker>,
     /// Seconds.
     now: Option<(f64, DVec2)>,
@@ -60,7 +60,7 @@ struct Walker {
 type Other = (DVec2, DVec2, f64);
 
 impl People {
-    pub(crate) fn new(people: &[Person]) -> Self {
+    pub fn new(people: &[Person]) -> Self {
         let walker = |person: &Person| Walker {
             at: person.at,
             velocity: DVec2::ZERO,
@@ -71,7 +71,7 @@ impl People {
         Self { walkers: people.iter().map(walker).collect(), now: None }
     }
 
-    pub(crate) fn advance(&mut self, time: f64, (robot, radius): (DVec2, f64), standing: &[Solid]) {
+    pub fn advance(&mut self, time: f64, (robot, radius): (DVec2, f64), standing: &[Solid]) {
         let (from_s, from) = self.now.replace((time, robot)).unwrap_or((0.0, robot));
         let for_s = (time - from_s).clamp(0.0, MOST_S);
         if self.walkers.is_empty() || for_s == 0.0 {
@@ -92,7 +92,7 @@ impl People {
         }
     }
 
-    pub(crate) fn solids(&self) -> impl Iterator<Item = Solid> + '_ {
+    pub fn solids(&self) -> impl Iterator<Item = Solid> + '_ {
         let profile: Profile = Drum::default().profile();
         self.walkers.iter().map(move |Walker { at, person, .. }| Solid {
             surface: Surface::Drum { at: *at, radius: person.radius_m },

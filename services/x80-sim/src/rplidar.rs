@@ -13,7 +13,7 @@ use crate::{laser::Laser, world::World};
 const QUALITY: u8 = 47;
 
 #[derive(Clone, Debug)]
-pub(crate) struct Rplidar {
+pub struct Rplidar {
     pub laser: Laser,
     product: Product,
     requests: Requests,
@@ -23,19 +23,19 @@ pub(crate) struct Rplidar {
 }
 
 impl Rplidar {
-    pub(crate) fn new(mission: &Mission, seed: u64) -> Option<Self> {
+    pub fn new(mission: &Mission, seed: u64) -> Option<Self> {
         let (_, sensor, product) = mission.rplidars().into_iter().next()?;
         assert!(product.sample_us > 0 && product.turns_hz > 0.0);
         let laser = Laser::with_own_wire(sensor, mission, seed);
         Some(Self { laser, product, requests: Requests::default(), next_s: None, turn: 0.0 })
     }
 
-    pub(crate) const fn is_scanning(&self) -> bool {
+    pub const fn is_scanning(&self) -> bool {
         self.next_s.is_some()
     }
 
     /// Ignores unknown requests, like old firmware.
-    pub(crate) fn answer(&mut self, bytes: &[u8], now: f64) -> Vec<u8> {
+    pub fn answer(&mut self, bytes: &[u8], now: f64) -> Vec<u8> {
         let mut answers = Vec::new();
         for request in self.requests.push(bytes) {
             let answer = match request {
@@ -65,7 +65,7 @@ impl Rplidar {
     }
 
     /// Returns the measurements since the last call up to `now`, when the robot is at `pose`.
-    pub(crate) fn measured(&mut self, world: &World, pose: Pose2, now: f64) -> Vec<u8> {
+    pub fn measured(&mut self, world: &World, pose: Pose2, now: f64) -> Vec<u8> {
         let mut bytes = Vec::new();
         let Some(mut at) = self.next_s.filter(|at| *at <= now) else {
             return bytes;

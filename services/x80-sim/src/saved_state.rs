@@ -6,17 +6,17 @@
 use common::kinematics::Pose2;
 use serde::{Deserialize, Serialize};
 
-pub(crate) const CAPACITY: usize = 256;
+pub const CAPACITY: usize = 256;
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SavedState {
-    pub(crate) tick: u64,
-    pub(crate) time_s: f64,
-    pub(crate) pose: Pose2,
+    pub tick: u64,
+    pub time_s: f64,
+    pub pose: Pose2,
     /// Counts of each motor channel since boot.
-    pub(crate) turned: [f64; 6],
-    pub(crate) contacts: u64,
-    pub(crate) silent: [bool; 6],
+    pub turned: [f64; 6],
+    pub contacts: u64,
+    pub silent: [bool; 6],
     /// Maximum time that a wheel turned after the last motion command.
-    pub(crate) stopping_time_s: f64,
+    pub stopping_time_s: f64,
 }

@@ -24,18 +24,18 @@ const REFERENCE: u16 = 2048;
 const CURRENT: (f64, f64) = (20.0, 0.2);
 /// Additional current of a stalled motor, AD counts; nominal. It is several times a rolling
 /// motor's.
-pub(crate) const STALL_CURRENT: f64 = 1500.0;
+pub const STALL_CURRENT: f64 = 1500.0;
 
 #[derive(Clone, Debug)]
 pub struct Ranging {
     front: usize,
     mounts: [Option<Mount>; SONARS],
     infrared: [Option<Mount>; INFRARED_RANGERS],
-    pub(crate) silence: Silence,
+    pub silence: Silence,
     sonar_noise: Noise,
     infrared_noise: Noise,
     /// Echoes for the next tick, if the ultrasonic rangers have listened.
-    pub(crate) heard: Option<[u8; 6]>,
+    pub heard: Option<[u8; 6]>,
 }
 
 impl Ranging {

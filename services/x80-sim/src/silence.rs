@@ -7,7 +7,7 @@ use crate::noise::{Noise, Source};
 /// Chain of two states per ranger, heard and silent, with a step per tick (E. N. Gilbert, "Capacity
 /// of a burst-noise channel", 1960).
 #[derive(Clone, Debug)]
-pub(crate) struct Silence {
+pub struct Silence {
     /// Probability of hearing the next reading.
     end: f64,
     /// Probability of falling silent.
@@ -19,7 +19,7 @@ pub(crate) struct Silence {
 
 impl Silence {
     /// Draws no random number if the share is 0.
-    pub(crate) fn new(physics: &SonarPhysics, period_s: f64, seed: u64) -> Self {
+    pub fn new(physics: &SonarPhysics, period_s: f64, seed: u64) -> Self {
         let share = physics.silence_share;
         let end = (period_s / physics.silence_mean_s).min(1.0);
         let mut noise = Noise::new(seed, Source::Silence);
@@ -31,7 +31,7 @@ impl Silence {
         }
     }
 
-    pub(crate) fn step(&mut self) -> [bool; 6] {
+    pub fn step(&mut self) -> [bool; 6] {
         if self.begin > 0.0 {
             for silent in &mut self.silent {
                 let changes = if *silent { self.end } else { self.begin };

@@ -2,10 +2,10 @@ use common::wire::{Request, Stream};
 
 /// Frames left of the standard, custom and motor stream; none for unlimited. All run from boot.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Streams([Option<u8>; 3]);
+pub struct Streams([Option<u8>; 3]);
 
 impl Streams {
-    pub(crate) fn request(&mut self, stream: Stream, request: Request) {
+    pub fn request(&mut self, stream: Stream, request: Request) {
         let left = match request {
             Request::Start => None,
             Request::Stop => Some(0),
@@ -21,7 +21,7 @@ impl Streams {
     }
 
     /// Returns the running streams and counts one frame of each as sent.
-    pub(crate) fn take_due(&mut self) -> [bool; 3] {
+    pub fn take_due(&mut self) -> [bool; 3] {
         let due = self.running();
         for left in self.0.iter_mut().flatten() {
             *left = left.saturating_sub(1);
@@ -29,7 +29,7 @@ impl Streams {
         due
     }
 
-    pub(crate) fn running(&self) -> [bool; 3] {
+    pub fn running(&self) -> [bool; 3] {
         self.0.map(|left| left != Some(0))
     }
 }

@@ -1,12 +1,12 @@
 use common::mission::{Mission, Realism};
 
 /// Returns a mission with a target aside and these lines.
-pub(crate) fn mission(text: &str) -> Mission {
+pub fn mission(text: &str) -> Mission {
     Mission::parse(&format!("target = [0, -5]\n{text}"), "test.toml").unwrap()
 }
 
 /// Returns a mission with ideal sensors and wheels, unless `text` names a realism.
-pub(crate) fn ideal(text: &str) -> Mission {
+pub fn ideal(text: &str) -> Mission {
     let mut mission = mission(text);
     if !text.contains("realism") {
         mission.simulation.realism = Realism::Laboratory;
@@ -15,6 +15,6 @@ pub(crate) fn ideal(text: &str) -> Mission {
 }
 
 #[track_caller]
-pub(crate) fn near(got: f64, want: f64, within: f64) {
+pub fn near(got: f64, want: f64, within: f64) {
     assert!((got - want).abs() <= within, "{got} instead of {want}, within {within}");
 }

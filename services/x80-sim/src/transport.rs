@@ -21,7 +21,7 @@ pub enum Transport {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Source {
+pub enum Source {
     Peer(SocketAddr),
     Connection(u64),
     Line,
@@ -29,7 +29,7 @@ pub(crate) enum Source {
 
 impl Source {
     /// Returns whether both are one host; it may use another port after a restart.
-    pub(crate) fn is_same_host(self, other: Self) -> bool {
+    pub fn is_same_host(self, other: Self) -> bool {
         match (self, other) {
             (Self::Peer(one), Self::Peer(other)) => one.ip() == other.ip(),
             // Connections follow each other, and a line has one end.
@@ -62,14 +62,10 @@ trait Wire {
 }
 
 /// Transport that drops bytes it cannot send.
-pub(crate) struct Way(Box<dyn Wire>);
+pub struct Way(Box<dyn Wire>);
 
 impl Way {
-    pub(crate) fn open(
-        transport: Transport,
-        address: SocketAddr,
-        own_user_only: bool,
-    ) -> Result<Self> {
+    pub fn open(transport: Transport, address: SocketAddr, own_user_only: bool) -> Result<Self> {
         let bound = |source| SimError::Bind { address, source };
         Ok(Self(match transport {
             Transport::Udp => Box::new(udp::Udp::bind(address, own_user_only).map_err(bound)?),
@@ -79,35 +75,32 @@ impl Way {
     }
 
     /// Sends datagrams, each with its receiver, to `host`, and receives none.
-    pub(crate) fn to(host: Sender<(SocketAddr, Vec<u8>)>) -> Self {
+    pub fn to(host: Sender<(SocketAddr, Vec<u8>)>) -> Self {
         Self(Box::new(host))
     }
 
-    pub(crate) fn connected(&mut self) -> Result<Option<Source>> {
+    pub fn connected(&mut self) -> Result<Option<Source>> {
         self.0.connected().map_err(|source| self.lost(source))
     }
 
-    pub(crate) fn address(&self) -> String {
+    pub fn address(&self) -> String {
         self.0.address()
     }
 
-    pub(crate) fn readable(&self) -> Vec<BorrowedFd<'_>> {
+    pub fn readable(&self) -> Vec<BorrowedFd<'_>> {
         self.0.readable()
     }
 
-    pub(crate) fn take_opened(&mut self) -> bool {
+    pub fn take_opened(&mut self) -> bool {
         self.0.take_opened()
     }
 
-    pub(crate) fn receive<'b>(
-        &mut self,
-        buffer: &'b mut [u8],
-    ) -> Result<Option<(Source, &'b [u8])>> {
+    pub fn receive<'b>(&mut self, buffer: &'b mut [u8]) -> Result<Option<(Source, &'b [u8])>> {
         let received = self.0.receive(buffer).map_err(|source| self.lost(source))?;
         Ok(received.and_then(|(source, length)| Some((source, buffer.get(..length)?))))
     }
 
-    pub(crate) fn send(&mut self, to: Source, bytes: &[u8]) {
+    pub fn send(&mut self, to: Source, bytes: &[u8]) {
         if let Err(error) = self.0.send(to, bytes) {
             tracing::debug!(?to, %error, "bytes to the host are lost");
         }

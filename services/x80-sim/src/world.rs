@@ -135,10 +135,10 @@ pub struct World {
     things: Vec<Visitor>,
     people: People,
     /// The world's other robot, extrapolated from its place.
-    pub(crate) other: Option<Other>,
+    pub other: Option<Other>,
     met: Vec<Solid>,
     holes: Vec<Hole>,
-    pub(crate) heights: Heights,
+    pub heights: Heights,
 }
 
 #[derive(Clone, Debug)]

@@ -131,14 +131,14 @@ impl Request {
 }
 
 /// Breaks a stage of any robot.
-pub(crate) fn inject(bus: &Bus, stage: &str, kind: FaultKind) -> Result<(), BusError> {
+pub fn inject(bus: &Bus, stage: &str, kind: FaultKind) -> Result<(), BusError> {
     let (id, stage, kind) = (monotonic_ns() | 1, name(stage), kind.into());
     let sample = FaultSample { id, stage, kind, although_real: 1, ..FaultSample::default() };
     bus.writer(&topics::FAULTS, 1)?.publish(0, MissionTime::default(), sample)
 }
 
 /// Says where the beacon is at the time of the newest pose.
-pub(crate) fn say_beacon(bus: &Bus, [x_m, y_m]: [f64; 2]) -> Result<(), BusError> {
+pub fn say_beacon(bus: &Bus, [x_m, y_m]: [f64; 2]) -> Result<(), BusError> {
     let pose = bus.reader(&topics::POSE)?.newest()?.unwrap_or_default();
     let (capture_ns, source, deviation_m) = (pose.stamp.stamp_ns, name("walker"), 0.02);
     let sample = BeaconSample { capture_ns, source, x_m, y_m, deviation_m, ..Default::default() };

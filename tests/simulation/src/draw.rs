@@ -33,24 +33,24 @@ const ASKED: usize = 2;
 const RESUMED: Duration = Duration::from_secs(50);
 
 /// Draws a time up to 3 s, seldom up to 30 s.
-pub(crate) fn a_while(random: &mut Random, least_s: f64) -> Duration {
+pub fn a_while(random: &mut Random, least_s: f64) -> Duration {
     let longest_s = if random.chance(0.2) { 30.0 } else { 3.0 };
     Duration::from_secs_f64(random.within(least_s, longest_s))
 }
 
-pub(crate) fn load(random: &mut Random) -> Load {
+pub fn load(random: &mut Random) -> Load {
     let loads = [Load::IDLE, Load::IDLE, Load::BUSY, Load::OVERLOADED, Load::STARVED];
     loads[random.below(loads.len())]
 }
 
 /// Draws how the robot takes commands: some keep the last one when none follows. Some robots stay.
-pub(crate) fn robot(random: &mut Random, mission: &mut Mission) {
+pub fn robot(random: &mut Random, mission: &mut Mission) {
     mission.simulation.ignores_time |= random.chance(0.3);
     mission.stay |= random.chance(STAYS);
 }
 
 /// Draws what an operator asks of a robot that stays and waits.
-pub(crate) fn while_waiting(random: &mut Random, mission: &Mission) -> Vec<Request> {
+pub fn while_waiting(random: &mut Random, mission: &Mission) -> Vec<Request> {
     let asked = if mission.stay { ASKED } else { 0 };
     let ask = |_| match random.below(3) {
         0 => Hand([random.within(-1.0, 1.0), random.within(-1.0, 1.0)]),
@@ -63,7 +63,7 @@ fn on_the_way(random: &mut Random, Mission { target, .. }: &Mission) -> [f64; 2]
     [target.x * random.share(), target.y * random.share()]
 }
 
-pub(crate) fn disturbances(random: &mut Random, mission: &Mission) -> Vec<Disturbance> {
+pub fn disturbances(random: &mut Random, mission: &Mission) -> Vec<Disturbance> {
     let mut all = Vec::new();
     for _ in 0..random.below(MOST + 1) {
         let at = WITHIN.mul_f64(random.share());

@@ -10,7 +10,7 @@ use self::{
 };
 use crate::{random::Random, robot_fault::RobotFault};
 
-pub(crate) mod lie;
+pub mod lie;
 mod words;
 
 const LATE: Duration = Duration::from_secs(2);
@@ -37,14 +37,14 @@ const NO_READING: f64 = -1.0;
 const MOST_KEPT: usize = 1024;
 
 #[derive(Debug)]
-pub(crate) struct Late {
+pub struct Late {
     pub at: Duration,
     pub bytes: Vec<u8>,
 }
 
 /// Passes bytes unchanged while no fault acts.
 #[derive(Default)]
-pub(crate) struct FaultInjector {
+pub struct FaultInjector {
     fault: Option<RobotFault>,
     chance: Random,
     channel: usize,
@@ -64,7 +64,7 @@ pub(crate) struct FaultInjector {
 }
 
 impl FaultInjector {
-    pub(crate) fn new(mission: &Mission, seed: u64) -> Self {
+    pub fn new(mission: &Mission, seed: u64) -> Self {
         let words = Words::of(mission.robot.protocol());
         let drawn = Some(Lie::draw(mission));
         Self { chance: Random::new(seed, 13), words, drawn, ..Self::default() }
@@ -72,7 +72,7 @@ impl FaultInjector {
 
     /// Draws the size of `fault` and the wheel that it affects. The fault acts until the next one
     /// or, without a fault, ends.
-    pub(crate) fn set(&mut self, fault: Option<RobotFault>) {
+    pub fn set(&mut self, fault: Option<RobotFault>) {
         self.fault = fault;
         (self.channel, self.size) = (self.chance.below(2), self.chance.share());
         self.lie = fault.and_then(|fault| self.lie_of(fault));
@@ -109,7 +109,7 @@ impl FaultInjector {
     }
 
     /// Converts the robot's bytes into those for the host.
-    pub(crate) fn report(&mut self, bytes: &[u8], now: Duration) -> Vec<Late> {
+    pub fn report(&mut self, bytes: &[u8], now: Duration) -> Vec<Late> {
         let mut out = Vec::new();
         for said in self.words.said(bytes) {
             if said.stream().is_some() {
@@ -151,7 +151,7 @@ impl FaultInjector {
     }
 
     /// Converts the host's bytes into those for the robot.
-    pub(crate) fn order(&mut self, bytes: &[u8]) -> Vec<u8> {
+    pub fn order(&mut self, bytes: &[u8]) -> Vec<u8> {
         let holds_wheels = self.fault == Some(RobotFault::HeldWheels);
         // A robot at rest has no speed to keep.
         let rests = self.newest_speeds() == Some([0.0; 2]);

@@ -10,7 +10,7 @@ use link::{
 const STARTS_AFTER_NS: u64 = 30_000_000;
 
 #[derive(Default)]
-pub(crate) struct Guard {
+pub struct Guard {
     /// Of the newest link, whose end the guard awaits.
     pub run: Option<Run>,
     orders: Option<Orders>,
@@ -18,11 +18,11 @@ pub(crate) struct Guard {
 }
 
 impl Guard {
-    pub(crate) fn on_link_ended(&mut self, now_ns: u64) {
+    pub fn on_link_ended(&mut self, now_ns: u64) {
         self.due_ns.get_or_insert(now_ns + STARTS_AFTER_NS);
     }
 
-    pub(crate) fn turn(&mut self, now_ns: u64, is_succeeded: bool) {
+    pub fn turn(&mut self, now_ns: u64, is_succeeded: bool) {
         self.due_ns = None;
         let Some(run) = &self.run else { return };
         let mark = OwedStop::of(run.robot.domain());

@@ -77,7 +77,7 @@ impl Observed {
 }
 
 #[derive(Default)]
-pub(crate) struct Invariants {
+pub struct Invariants {
     protocol: Protocol,
     in_ticks: bool,
     observed: Option<Observed>,
@@ -109,23 +109,23 @@ pub(crate) struct Invariants {
     joins: u64,
 }
 
-pub(crate) type Checked = Result<(), (&'static str, String)>;
+pub type Checked = Result<(), (&'static str, String)>;
 
 fn holds(holds: bool, invariant: &'static str, detail: impl FnOnce() -> String) -> Checked {
     if holds { Ok(()) } else { Err((invariant, detail())) }
 }
 
 impl Invariants {
-    pub(crate) fn new(protocol: Protocol, in_ticks: bool) -> Self {
+    pub fn new(protocol: Protocol, in_ticks: bool) -> Self {
         Self { protocol, in_ticks, wire_is_calm: true, obeys: true, ..Self::default() }
     }
 
-    pub(crate) fn on_bus(&mut self, memory: &Rc<Memory>) {
+    pub fn on_bus(&mut self, memory: &Rc<Memory>) {
         self.observed = Observed::open(memory).ok();
         (self.order, self.compared) = (None, 0);
     }
 
-    pub(crate) fn on_disturbance(&mut self, what: &What, now: Duration) {
+    pub fn on_disturbance(&mut self, what: &What, now: Duration) {
         use What::*;
         self.was_faulty |= matches!(what, Wire(..) | Fault(Some(_)));
         match what {
@@ -150,7 +150,7 @@ impl Invariants {
     }
 
     /// Notes what the link or its guard sends.
-    pub(crate) fn on_sent(&mut self, bytes: &[u8], now: Duration) {
+    pub fn on_sent(&mut self, bytes: &[u8], now: Duration) {
         let Some(moves) = self.moves(bytes) else { return };
         (self.sent, self.told) = (Some(moves), Some(now));
         if moves {
@@ -198,7 +198,7 @@ impl Invariants {
     }
 
     /// Checks every invariant after an event.
-    pub(crate) fn check(&mut self, machine: &SimulatedMachine) -> Checked {
+    pub fn check(&mut self, machine: &SimulatedMachine) -> Checked {
         let now = machine.now();
         let sent = self.sent.take();
         // The supervisor gives orders between events, so the link may have read the newest one.
@@ -310,7 +310,7 @@ impl Invariants {
     }
 
     /// Checks how a run ended.
-    pub(crate) fn check_end(
+    pub fn check_end(
         &self,
         machine: &SimulatedMachine,
         mission: &Mission,

@@ -14,6 +14,8 @@
 //! without middleware, systemd, signals to the supervisor and the middleware itself need real
 //! processes.
 
+#![allow(unreachable_pub)]
+
 mod disturbance;
 mod draw;
 mod fault_injector;

@@ -48,7 +48,7 @@ const FIRST_PROCESS: u32 = 1000;
 const OPERATOR: u32 = 1;
 const OBSERVER: u32 = 2;
 const GUARD: u32 = 3;
-pub(crate) const LINK: &str = "link";
+pub const LINK: &str = "link";
 /// Ticks that a pose may be late.
 const RECENT_TICKS: usize = 400;
 /// Most events of a second; in lockstep a run takes little more.
@@ -66,7 +66,7 @@ enum Event {
 }
 
 #[derive(Default)]
-pub(crate) struct SimulatedMachine {
+pub struct SimulatedMachine {
     own: Weak<Self>,
     now_ns: Cell<u64>,
     running: Cell<u32>,
@@ -98,10 +98,7 @@ pub(crate) struct SimulatedMachine {
 }
 
 impl SimulatedMachine {
-    pub(crate) fn new(
-        scenario: &Scenario,
-        observer: Option<Rc<RefCell<dyn Observer>>>,
-    ) -> Rc<Self> {
+    pub fn new(scenario: &Scenario, observer: Option<Rc<RefCell<dyn Observer>>>) -> Rc<Self> {
         let Scenario { seed, load, .. } = *scenario;
         let mut disturbances = scenario.disturbances.clone();
         disturbances.sort_by_key(|disturbance| std::cmp::Reverse(disturbance.at));
@@ -127,28 +124,28 @@ impl SimulatedMachine {
         })
     }
 
-    pub(crate) fn now(&self) -> Duration {
+    pub fn now(&self) -> Duration {
         Duration::from_nanos(self.monotonic_ns() - BEGIN_NS)
     }
 
-    pub(crate) fn place(&self, robot: InMemory) {
+    pub fn place(&self, robot: InMemory) {
         self.robot.replace(Some(robot));
     }
 
     /// Returns the newest ground truth.
-    pub(crate) fn truth(&self) -> Option<GroundTruthTick> {
+    pub fn truth(&self) -> Option<GroundTruthTick> {
         self.robot.borrow().as_ref()?.truth.last().copied()
     }
 
     /// Returns the ground truth of a recent pose, by its counts.
-    pub(crate) fn truth_of(&self, pose: &PoseSample) -> Option<GroundTruthTick> {
+    pub fn truth_of(&self, pose: &PoseSample) -> Option<GroundTruthTick> {
         let robot = self.robot.borrow();
         let recent = robot.as_ref()?.truth.iter().rev().take(RECENT_TICKS);
         recent.copied().find(|tick| tick.is_of(pose))
     }
 
     /// Takes what came of the run.
-    pub(crate) fn take_ran(&self, finished: Option<Finished>, summary: Option<Summary>) -> Ran {
+    pub fn take_ran(&self, finished: Option<Finished>, summary: Option<Summary>) -> Ran {
         let mut invariants = self.invariants.borrow_mut();
         Ran {
             finished,
@@ -164,28 +161,28 @@ impl SimulatedMachine {
     }
 
     /// Copies the ground truth that `to` does not have yet.
-    pub(crate) fn add_truth(&self, to: &mut Vec<GroundTruthTick>) {
+    pub fn add_truth(&self, to: &mut Vec<GroundTruthTick>) {
         if let Some(robot) = &*self.robot.borrow() {
             to.extend_from_slice(robot.truth.get(to.len()..).unwrap_or_default());
         }
     }
 
     /// Sets the time after which a run that goes on breaks an invariant.
-    pub(crate) fn end_after(&self, time: Duration) {
+    pub fn end_after(&self, time: Duration) {
         self.ends_ns.set(BEGIN_NS + time.as_nanos() as u64);
     }
 
     /// Returns whether the scenario has ended or an invariant is broken.
-    pub(crate) fn is_over(&self) -> bool {
+    pub fn is_over(&self) -> bool {
         self.is_ended.get() || self.broken.borrow().is_some()
     }
 
-    pub(crate) fn check_end(&self, mission: &Mission, finished: &Finished) {
+    pub fn check_end(&self, mission: &Mission, finished: &Finished) {
         self.judge(self.invariants.borrow().check_end(self, mission, finished));
     }
 
     /// Begins the life of a supervisor, with a new bus. Returns the bus.
-    pub(crate) fn start_supervisor(&self) -> Bus {
+    pub fn start_supervisor(&self) -> Bus {
         let process = self.new_process();
         self.supervisors.update(|supervisors| supervisors + 1);
         self.supervisor.set(process);
@@ -194,7 +191,7 @@ impl SimulatedMachine {
     }
 
     /// Makes a bus for the supervisor and its next stages.
-    pub(crate) fn new_bus(&self) -> Bus {
+    pub fn new_bus(&self) -> Bus {
         let memory = Rc::<Memory>::default();
         self.memory.replace(Rc::clone(&memory));
         self.invariants.borrow_mut().on_bus(&memory);
@@ -204,7 +201,7 @@ impl SimulatedMachine {
         Bus::in_memory(memory, Some(self.supervisor.get()))
     }
 
-    pub(crate) fn supervisor_is_killed(&self) -> bool {
+    pub fn supervisor_is_killed(&self) -> bool {
         self.has_met_doom(self.supervisor.get())
     }
 
@@ -213,7 +210,7 @@ impl SimulatedMachine {
     }
 
     /// Passes time without a supervisor, whose stages end in order.
-    pub(crate) fn pass(&self, time: Duration) {
+    pub fn pass(&self, time: Duration) {
         self.running.set(OBSERVER);
         for process in self.processes.borrow_mut().values_mut() {
             (process.is_terminated, process.due_ns) = (true, self.monotonic_ns());
@@ -227,7 +224,7 @@ impl SimulatedMachine {
     }
 
     /// Starts a stage's process.
-    pub(crate) fn start(&self, generation: &Generation, run: Run) -> u32 {
+    pub fn start(&self, generation: &Generation, run: Run) -> u32 {
         let process = self.new_process();
         if generation.stage == LINK {
             self.guard.borrow_mut().run = Some(run.clone());
@@ -238,7 +235,7 @@ impl SimulatedMachine {
         process
     }
 
-    pub(crate) fn signal(&self, process: u32, signal: Signal) {
+    pub fn signal(&self, process: u32, signal: Signal) {
         let mut processes = self.processes.borrow_mut();
         let Some(process) = processes.get_mut(&process).filter(|process| process.is_live()) else {
             return;
@@ -253,7 +250,7 @@ impl SimulatedMachine {
     }
 
     /// Returns how the process ended, if it did, and forgets it.
-    pub(crate) fn reap(&self, process: u32) -> Option<ExitCause> {
+    pub fn reap(&self, process: u32) -> Option<ExitCause> {
         let mut processes = self.processes.borrow_mut();
         let exit = processes.get_mut(&process)?.exit.take()?;
         processes.remove(&process);
@@ -261,7 +258,7 @@ impl SimulatedMachine {
     }
 
     /// Returns the activity of a live process since its start.
-    pub(crate) fn activity(&self, process: u32) -> Option<Activity> {
+    pub fn activity(&self, process: u32) -> Option<Activity> {
         let processes = self.processes.borrow();
         let process = processes.get(&process).filter(|process| process.is_live())?;
         Some(process.activity(self.monotonic_ns()))
@@ -380,7 +377,7 @@ impl SimulatedMachine {
         }
     }
 
-    pub(crate) fn send_to_robot(&self, from: Port, bytes: &[u8]) {
+    pub fn send_to_robot(&self, from: Port, bytes: &[u8]) {
         self.invariants.borrow_mut().on_sent(bytes, self.now());
         self.wires.borrow_mut().lane(Way::ToRobot).send(from, bytes, self.monotonic_ns());
     }
@@ -392,7 +389,7 @@ impl SimulatedMachine {
     }
 
     /// Returns what an invariant wants, or breaks off without it.
-    pub(crate) fn or_break_off<T>(
+    pub fn or_break_off<T>(
         &self,
         invariant: &'static str,
         result: Result<T, impl ToString>,
@@ -401,7 +398,7 @@ impl SimulatedMachine {
     }
 
     /// Ends the simulation: the supervisor fails whatever it does next.
-    pub(crate) fn break_off(&self, invariant: &'static str, detail: String) {
+    pub fn break_off(&self, invariant: &'static str, detail: String) {
         let (event, at) = (self.events.get(), self.now());
         let broken = Broken { invariant, detail, event, at };
         self.broken.borrow_mut().get_or_insert(broken);
@@ -490,14 +487,14 @@ impl SimulatedMachine {
     }
 
     /// Returns the live process of a stage.
-    pub(crate) fn process_of(&self, stage: &str) -> Option<u32> {
+    pub fn process_of(&self, stage: &str) -> Option<u32> {
         let processes = self.processes.borrow();
         let mut live = processes.iter().filter(|(_, it)| it.stage == stage && it.is_live());
         live.next_back().map(|(number, _)| *number)
     }
 
     /// Returns whether the stage's process has opened its topics.
-    pub(crate) fn is_open(&self, stage: &str) -> bool {
+    pub fn is_open(&self, stage: &str) -> bool {
         let processes = self.processes.borrow();
         processes.values().any(|it| it.stage == stage && it.is_live() && it.turns.is_some())
     }
@@ -545,14 +542,14 @@ impl SimulatedMachine {
     }
 
     /// Publishes an operator's request.
-    pub(crate) fn ask(&self, request: Request) {
+    pub fn ask(&self, request: Request) {
         let here = self.truth().map(|truth| truth.pose());
         // Nobody hears an operator while there is no supervisor.
         let _ = self.as_operator(|bus| request.publish(bus, here.unwrap_or_default()));
     }
 
     /// Acts as another process on the bus, whose operations are not counted as the running one's.
-    pub(crate) fn as_operator<T>(&self, act: impl FnOnce(&Bus) -> T) -> T {
+    pub fn as_operator<T>(&self, act: impl FnOnce(&Bus) -> T) -> T {
         let before = self.running.replace(OPERATOR);
         let done = act(&Bus::in_memory(Rc::clone(&self.memory.borrow()), None));
         self.running.set(before);

@@ -11,7 +11,7 @@ use rustix::process::Signal;
 
 /// A stage's process.
 #[derive(Default)]
-pub(crate) struct Process {
+pub struct Process {
     pub stage: &'static str,
     /// Until its first turn.
     pub starts: Option<(Generation, Run)>,
@@ -34,7 +34,7 @@ pub(crate) struct Process {
 }
 
 impl Process {
-    pub(crate) fn new(generation: &Generation, run: Run, due_ns: u64) -> Self {
+    pub fn new(generation: &Generation, run: Run, due_ns: u64) -> Self {
         Self {
             stage: generation.stage,
             starts: Some((generation.clone(), run)),
@@ -44,18 +44,18 @@ impl Process {
         }
     }
 
-    pub(crate) fn is_live(&self) -> bool {
+    pub fn is_live(&self) -> bool {
         self.exit.is_none()
     }
 
     /// Returns the time of the next turn, or of the wakeup before it.
-    pub(crate) fn next_ns(&self) -> Option<u64> {
+    pub fn next_ns(&self) -> Option<u64> {
         let runs = self.is_live() && !self.frozen && self.spins_since_ns.is_none();
         runs.then(|| self.woken_ns.unwrap_or(self.due_ns))
     }
 
     /// Returns the time that the process ran and starved since its start, and its state.
-    pub(crate) fn activity(&self, now_ns: u64) -> Activity {
+    pub fn activity(&self, now_ns: u64) -> Activity {
         let since = |ns: u64| Duration::from_nanos(now_ns.saturating_sub(ns));
         let state = match self {
             Self { frozen: true, .. } => State::Stopped,
@@ -68,6 +68,6 @@ impl Process {
     }
 }
 
-pub(crate) const fn killed_by(signal: Signal) -> ExitCause {
+pub const fn killed_by(signal: Signal) -> ExitCause {
     ExitCause::Signalled { signal: signal.as_raw(), core: false }
 }

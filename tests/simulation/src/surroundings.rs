@@ -32,7 +32,7 @@ use rustix::process::Signal;
 
 use crate::{disturbance::Request, machine::SimulatedMachine};
 
-pub(crate) struct Simulated {
+pub struct Simulated {
     machine: Rc<SimulatedMachine>,
     bus: Rc<Bus>,
     /// Of an operator at a robot that waits for a target.
@@ -41,7 +41,7 @@ pub(crate) struct Simulated {
 }
 
 impl Simulated {
-    pub(crate) fn new(machine: &Rc<SimulatedMachine>, while_waiting: &[Request]) -> Self {
+    pub fn new(machine: &Rc<SimulatedMachine>, while_waiting: &[Request]) -> Self {
         Self {
             machine: Rc::clone(machine),
             bus: Rc::new(machine.start_supervisor()),

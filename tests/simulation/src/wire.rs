@@ -30,7 +30,7 @@ pub struct Quality {
 }
 
 /// Port of a host's end. Each opened wire has another.
-pub(crate) type Port = u16;
+pub type Port = u16;
 
 #[derive(Debug)]
 struct Datagram {
@@ -41,7 +41,7 @@ struct Datagram {
 
 /// Datagrams of one direction.
 #[derive(Debug, Default)]
-pub(crate) struct Lane {
+pub struct Lane {
     pub quality: Quality,
     /// Arrival of the last datagram that kept its order.
     in_order_ns: u64,
@@ -55,7 +55,7 @@ const LEAST_NS: u64 = 100_000;
 const LATE: Duration = Duration::from_millis(150);
 
 impl Lane {
-    pub(crate) fn send(&mut self, port: Port, bytes: &[u8], now_ns: u64) {
+    pub fn send(&mut self, port: Port, bytes: &[u8], now_ns: u64) {
         let Quality { lost, doubled, reordered, delay } = self.quality;
         if lost > 0.0 && self.random.chance(lost) {
             return;
@@ -79,7 +79,7 @@ impl Lane {
 }
 
 #[derive(Debug, Default)]
-pub(crate) struct Wires {
+pub struct Wires {
     /// By [`Way`].
     lanes: [Lane; 2],
     /// What has come for each open end.
@@ -90,27 +90,27 @@ pub(crate) struct Wires {
 const FIRST_PORT: Port = 40_000;
 
 impl Wires {
-    pub(crate) fn new(seed: u64) -> Self {
+    pub fn new(seed: u64) -> Self {
         let lane = |stream| Lane { random: Random::new(seed, stream), ..Lane::default() };
         Self { lanes: [1, 2].map(lane), ..Self::default() }
     }
 
-    pub(crate) fn lane(&mut self, way: Way) -> &mut Lane {
+    pub fn lane(&mut self, way: Way) -> &mut Lane {
         &mut self.lanes[way as usize]
     }
 
-    pub(crate) fn next_ns(&self, way: Way) -> Option<u64> {
+    pub fn next_ns(&self, way: Way) -> Option<u64> {
         self.lanes[way as usize].under_way.front().map(|datagram| datagram.due_ns)
     }
 
     /// Takes a datagram that has come to the robot, with its sender.
-    pub(crate) fn take_for_robot(&mut self) -> Option<(Port, Vec<u8>)> {
+    pub fn take_for_robot(&mut self) -> Option<(Port, Vec<u8>)> {
         let Datagram { port, bytes, .. } = self.lane(Way::ToRobot).under_way.pop_front()?;
         Some((port, bytes))
     }
 
     /// Puts a datagram that has come to its host's end, unless that is closed.
-    pub(crate) fn deliver_to_host(&mut self) {
+    pub fn deliver_to_host(&mut self) {
         if let Some(Datagram { port, bytes, .. }) = self.lane(Way::ToHost).under_way.pop_front()
             && let Some(inbox) = self.inboxes.get_mut(&port)
         {
@@ -118,21 +118,21 @@ impl Wires {
         }
     }
 
-    pub(crate) fn has_mail(&self) -> bool {
+    pub fn has_mail(&self) -> bool {
         self.inboxes.values().any(|inbox| !inbox.is_empty())
     }
 }
 
 /// A host's end of a wire.
 #[derive(Debug)]
-pub(crate) struct HostEnd {
+pub struct HostEnd {
     wires: Rc<RefCell<Wires>>,
     port: Port,
     machine: Weak<SimulatedMachine>,
 }
 
 impl HostEnd {
-    pub(crate) fn open(wires: &Rc<RefCell<Wires>>, machine: Weak<SimulatedMachine>) -> Self {
+    pub fn open(wires: &Rc<RefCell<Wires>>, machine: Weak<SimulatedMachine>) -> Self {
         let mut opened = wires.borrow_mut();
         opened.opened = opened.opened.wrapping_add(1);
         let port = FIRST_PORT.wrapping_add(opened.opened);

@@ -91,7 +91,7 @@ impl Place {
     }
 }
 
-pub(super) struct Meeting {
+pub struct Meeting {
     socket: UnixDatagram,
     other: PathBuf,
     stop: OwnedFd,
@@ -107,7 +107,7 @@ pub(super) struct Meeting {
 
 impl Meeting {
     /// Binds the socket `own`; `other` is the other robot's. A readable `stop` ends waits.
-    pub(super) fn open(
+    pub fn open(
         mission: &Mission,
         [own, other]: [PathBuf; 2],
         stop: &impl AsFd,
@@ -143,7 +143,7 @@ impl Meeting {
         })
     }
 
-    pub(super) fn other_at(&mut self, now_s: f64) -> Result<Option<Other>> {
+    pub fn other_at(&mut self, now_s: f64) -> Result<Option<Other>> {
         let began = Instant::now();
         loop {
             self.take(now_s);
@@ -195,7 +195,7 @@ impl Meeting {
     }
 
     /// A contact ends its mission, and it stays there.
-    pub(super) fn tell(&mut self, truth: &GroundTruthTick, ended: bool) {
+    pub fn tell(&mut self, truth: &GroundTruthTick, ended: bool) {
         if self.own.ended {
             return;
         }

@@ -39,7 +39,7 @@ enum Leg {
     ToHost(Source),
 }
 
-pub(super) struct Session {
+pub struct Session {
     robot: Robot,
     clock: SimClock,
     way: Way,
@@ -78,7 +78,7 @@ impl Words {
 }
 
 impl Session {
-    pub(super) fn new(
+    pub fn new(
         mission: &Mission,
         robot: Robot,
         pace: Pace,
@@ -117,7 +117,7 @@ impl Session {
     }
 
     /// Saves the robot when it has come to rest.
-    pub(super) fn end(mut self) -> Result {
+    pub fn end(mut self) -> Result {
         // The other robot sees the same path to rest, regardless of late commands.
         let Self { robot, meeting, .. } = &mut self;
         let mut tell = |robot: &mut Robot, ended| {
@@ -130,13 +130,13 @@ impl Session {
         self.save()
     }
 
-    pub(super) fn readable(&self) -> Vec<BorrowedFd<'_>> {
+    pub fn readable(&self) -> Vec<BorrowedFd<'_>> {
         let ways = std::iter::once(&self.way).chain(&self.laser_way);
         ways.flat_map(Way::readable).collect()
     }
 
     /// Returns the time to the next self-triggered event; none in lockstep.
-    pub(super) fn patience(&self) -> Option<Duration> {
+    pub fn patience(&self) -> Option<Duration> {
         self.clock.wait_for(self.next_due_s(), monotonic_ns())
     }
 
@@ -174,7 +174,7 @@ impl Session {
     }
 
     /// Up to a limit.
-    pub(super) fn listen(&mut self, buffer: &mut [u8]) -> Result {
+    pub fn listen(&mut self, buffer: &mut [u8]) -> Result {
         while let Some((source, bytes)) =
             self.laser_way.as_mut().map(|way| way.receive(buffer)).transpose()?.flatten()
         {
@@ -192,7 +192,7 @@ impl Session {
         Ok(())
     }
 
-    pub(super) fn take(&mut self, source: Source, bytes: &[u8]) -> Result {
+    pub fn take(&mut self, source: Source, bytes: &[u8]) -> Result {
         let opened = self.way.take_opened();
         // Messages of the robot protocols begin differently.
         let is_laser = self.robot.rplidar.is_some()
@@ -223,7 +223,7 @@ impl Session {
         Ok(())
     }
 
-    pub(super) fn catch_up(&mut self) -> Result {
+    pub fn catch_up(&mut self) -> Result {
         if let Some(now) = self.clock.now(monotonic_ns()) {
             self.pass(now)?;
             self.clock.forgive(self.next_tick_s(), monotonic_ns());

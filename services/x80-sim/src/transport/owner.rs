@@ -14,13 +14,13 @@ const READINGS: usize = 3;
 
 /// Filter that admits only this user on this machine.
 #[derive(Debug, Default)]
-pub(super) struct OwnUser {
+pub struct OwnUser {
     senders: VecDeque<(SocketAddr, Instant, bool)>,
     told: bool,
 }
 
 impl OwnUser {
-    pub(super) fn admits(&mut self, sender: SocketAddr) -> bool {
+    pub fn admits(&mut self, sender: SocketAddr) -> bool {
         let known = self.senders.iter().position(|(known, ..)| *known == sender);
         let known = known.and_then(|known| self.senders.remove(known));
         let (asked, own) = match known {

@@ -19,7 +19,7 @@ use super::{Source, Wire};
 const NOBODYS_BAUD: u32 = 50;
 
 #[derive(Debug)]
-pub(crate) struct Pty {
+pub struct Pty {
     robot: OwnedFd,
     /// Host's end, held open: reading the robot's end fails while no process holds it.
     host: OwnedFd,
@@ -31,7 +31,7 @@ pub(crate) struct Pty {
 }
 
 impl Pty {
-    pub(super) fn open() -> io::Result<Self> {
+    pub fn open() -> io::Result<Self> {
         let robot = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
         grantpt(&robot)?;
         unlockpt(&robot)?;

@@ -9,7 +9,7 @@ use std::{
 use super::{Source, Wire};
 
 #[derive(Debug)]
-pub(crate) struct Tcp {
+pub struct Tcp {
     listener: TcpListener,
     address: SocketAddr,
     connection: Option<TcpStream>,
@@ -20,7 +20,7 @@ pub(crate) struct Tcp {
 }
 
 impl Tcp {
-    pub(super) fn bind(address: SocketAddr) -> io::Result<Self> {
+    pub fn bind(address: SocketAddr) -> io::Result<Self> {
         let listener = TcpListener::bind(address)?;
         listener.set_nonblocking(true)?;
         Ok(Self {

@@ -8,10 +8,10 @@ use super::{Source, Wire, owner::OwnUser};
 
 /// Maximum datagram, below UDP's limit of 65,507 bytes. Lines with a scan of thousands of beams
 /// take several.
-pub(super) const LONGEST: usize = 60_000;
+pub const LONGEST: usize = 60_000;
 
 #[derive(Debug)]
-pub(crate) struct Udp {
+pub struct Udp {
     socket: UdpSocket,
     address: SocketAddr,
     /// Sender filter; none admits every sender.
@@ -19,7 +19,7 @@ pub(crate) struct Udp {
 }
 
 impl Udp {
-    pub(super) fn bind(address: SocketAddr, own_user_only: bool) -> io::Result<Self> {
+    pub fn bind(address: SocketAddr, own_user_only: bool) -> io::Result<Self> {
         let socket = UdpSocket::bind(address)?;
         socket.set_nonblocking(true)?;
         let address = socket.local_addr()?;

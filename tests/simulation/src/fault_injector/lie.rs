@@ -19,7 +19,7 @@ const LEAST_M: f64 = 0.02;
 const BEAMS: usize = 64;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Stream {
+pub enum Stream {
     Wheel(usize),
     Wheels,
     Gyro,
@@ -37,7 +37,7 @@ impl Stream {
 
 /// Sizes are radians of wheels and gyros, and metres of ranges.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Change {
+pub enum Change {
     /// The change since the lie began, or the range, times a factor.
     Scaled(f64),
     Shifted(f64),

@@ -15,10 +15,10 @@ use common::{
 const HELD_AD: u16 = 1520;
 const LONGEST_ECHO_M: f64 = 2.54;
 const MOTOR_BYTES: usize = 33;
-pub(super) const COUNT_RAD: f64 = TAU / 1200.0;
+pub const COUNT_RAD: f64 = TAU / 1200.0;
 
 #[derive(Default)]
-pub(super) struct Words {
+pub struct Words {
     /// All but an X80 say lines.
     protocol: Protocol,
     robot_frames: Decoder,
@@ -30,16 +30,16 @@ pub(super) struct Words {
 }
 
 impl Words {
-    pub(super) fn of(protocol: Protocol) -> Self {
+    pub fn of(protocol: Protocol) -> Self {
         Self { protocol, ..Self::default() }
     }
 
     /// Returns the range of a stuck sensor, metres.
-    pub(super) fn stuck_m(&self) -> f64 {
+    pub fn stuck_m(&self) -> f64 {
         if self.protocol == Protocol::X80 { 0.08 } else { 0.3 }
     }
 
-    pub(super) fn said(&mut self, bytes: &[u8]) -> Vec<Said> {
+    pub fn said(&mut self, bytes: &[u8]) -> Vec<Said> {
         if self.protocol == Protocol::X80 {
             let said = frames(&mut self.robot_frames, bytes, |frame| {
                 Said::of_frame(frame, &mut self.encoders, &mut self.counts)
@@ -50,7 +50,7 @@ impl Words {
         lines.map(|report| Said { report, frame: None }).collect()
     }
 
-    pub(super) fn ordered(&mut self, bytes: &[u8]) -> Vec<(Vec<u8>, Effect)> {
+    pub fn ordered(&mut self, bytes: &[u8]) -> Vec<(Vec<u8>, Effect)> {
         if self.protocol == Protocol::X80 {
             return frames(&mut self.host_frames, bytes, |frame| {
                 let mut bytes = Vec::new();
@@ -74,9 +74,9 @@ fn frames<T>(decoder: &mut Decoder, bytes: &[u8], mut of: impl FnMut(&Frame<'_>)
 
 /// Message of the robot, in JSON terms for every protocol.
 #[derive(Clone)]
-pub(super) struct Said {
+pub struct Said {
     /// Report; an X80's wheels are its channels, its ranges those of its sonars by number.
-    pub(super) report: json_wire::Report,
+    pub report: json_wire::Report,
     frame: Option<(Addressing, Report)>,
 }
 
@@ -110,7 +110,7 @@ impl Said {
         Some(Self { report, frame: Some((Addressing::of_host(frame.rid)?, parsed)) })
     }
 
-    pub(super) fn bytes(&self) -> Vec<u8> {
+    pub fn bytes(&self) -> Vec<u8> {
         let Some((addressing, mut frame)) = self.frame else { return line(&self.report) };
         let json_wire::Report { wheels, speeds, held, ranges, .. } = &self.report;
         match &mut frame {
@@ -146,29 +146,29 @@ impl Said {
         bytes
     }
 
-    pub(super) const fn is_frame(&self) -> bool {
+    pub const fn is_frame(&self) -> bool {
         self.frame.is_some()
     }
 
-    pub(super) fn readings(&self) -> [bool; 3] {
+    pub fn readings(&self) -> [bool; 3] {
         let json_wire::Report { ranges, scan, scans, .. } = &self.report;
         let has_further = matches!(self.frame, Some((_, Report::Custom(_))));
         [!ranges.is_empty(), scan.is_some() || !scans.is_empty(), has_further]
     }
 
-    pub(super) fn stream(&self) -> Option<usize> {
+    pub fn stream(&self) -> Option<usize> {
         let has_wheels = self.report.wheels.is_some();
         std::iter::once(has_wheels).chain(self.readings()).position(|has| has)
     }
 
-    pub(super) fn with_readings_of(self, other: Self) -> Self {
+    pub fn with_readings_of(self, other: Self) -> Self {
         let json_wire::Report { ranges, scan, scans, .. } = other.report;
         let report = json_wire::Report { ranges, scan, scans, ..self.report };
         Self { report, frame: other.frame }
     }
 
     /// Sets every data byte of a wheel message to `byte`; in JSON, the wheels become 0.
-    pub(super) fn with_data(mut self, byte: u8) -> Vec<u8> {
+    pub fn with_data(mut self, byte: u8) -> Vec<u8> {
         if self.report.wheels.is_some() {
             if let Some((addressing, _)) = self.frame {
                 let (rid, mut bytes) = (addressing.host(), Vec::new());
@@ -182,7 +182,7 @@ impl Said {
     }
 }
 
-pub(super) enum Effect {
+pub enum Effect {
     /// Turning wheels; the bytes make them stand instead.
     Moves {
         stand: Vec<u8>,
