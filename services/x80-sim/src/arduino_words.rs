@@ -17,7 +17,7 @@ const BOOTS_S: f64 = 1.5;
 const STOPS_AFTER_MS: u16 = 2000;
 const LONGEST: usize = 64;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy)]
 pub enum Request {
     /// `e`: the encoder counts.
     Counts,
@@ -50,7 +50,7 @@ impl Request {
     }
 }
 
-#[derive(Clone, Debug, Default)]
+#[derive(Default)]
 pub struct Requests {
     held: Vec<u8>,
 }
@@ -69,7 +69,6 @@ impl Requests {
     }
 }
 
-#[derive(Clone, Debug)]
 pub struct ArduinoWords {
     board: ArduinoBoard,
     wheels: [OnChannel; 2],

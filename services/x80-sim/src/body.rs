@@ -14,7 +14,6 @@ const RELEASE_M: f64 = 0.005;
 const PUSHES: usize = 4;
 const NOTHING: (f64, Option<DVec2>) = (f64::INFINITY, None);
 
-#[derive(Clone, Debug)]
 pub struct Body {
     drive: DifferentialDrive,
     /// True track, metres; W is the nominal one.

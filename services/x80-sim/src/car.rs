@@ -14,7 +14,6 @@ use crate::{
     world::World,
 };
 
-#[derive(Clone, Copy, Debug)]
 pub struct Car {
     drive: Ackermann,
     steering: Steering,

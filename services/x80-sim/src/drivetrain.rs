@@ -19,7 +19,7 @@ pub fn grip(held: bool, physics: &WheelPhysics) -> Option<f64> {
 }
 
 /// Channel of a wheel or a car's steering, and its counts' sign for driving ahead or steering left.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct OnChannel {
     pub channel: usize,
     pub sign: f64,
@@ -50,7 +50,7 @@ pub fn velocity(wheels: [OnChannel; 2], counts: [f64; 2], limit_ms: u16) -> Comm
 }
 
 /// Left first.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Drivetrain {
     on: [OnChannel; 2],
     metres_per_count: f64,

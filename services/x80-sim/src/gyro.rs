@@ -4,7 +4,6 @@ use common::{geometry::wrap_angle, mission::Mission};
 
 use crate::noise::{Noise, Source};
 
-#[derive(Clone, Debug)]
 pub struct Gyro {
     noise_rad_sqrt_s: f64,
     bias_rad_s: f64,

@@ -18,7 +18,6 @@ use crate::{
     sensors::STALL_CURRENT,
 };
 
-#[derive(Clone, Debug)]
 pub struct JsonWords {
     wheels: [OnChannel; 2],
     held_current_ad: f64,

@@ -32,7 +32,6 @@ const GLASS_LIMIT_DEG: f64 = 5.0;
 
 const FASTEST_M_S: f64 = 5.0;
 
-#[derive(Clone, Debug)]
 pub struct Laser {
     pub sensor: Sensor,
     height_m: f64,

@@ -28,7 +28,6 @@ const SLIPS_AT: f64 = 0.4;
 /// overwrite the newest.
 const MOST_PENDING: usize = 1024;
 
-#[derive(Clone, Debug)]
 pub struct Motor {
     physics: WheelPhysics,
     top_speed: f64,
@@ -45,7 +44,7 @@ pub struct Motor {
     pub load: f64,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy)]
 struct Order {
     quantity: Quantity,
     value: i16,

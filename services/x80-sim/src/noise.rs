@@ -2,7 +2,6 @@
 
 use rand_pcg::{Pcg64, rand_core::Rng};
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     Sonar = 1,
     Infrared = 2,
@@ -15,7 +14,6 @@ pub enum Source {
     Gyro = 9,
 }
 
-#[derive(Clone, Debug)]
 pub struct Noise(Pcg64);
 
 impl Noise {

@@ -40,14 +40,14 @@ const PATIENCE: (f64, f64) = (2.0, 3.0);
 const LONGEST_S: f64 = 0.05;
 const MOST_S: f64 = 60.0;
 
-#[derive(Clone, Debug, Default)]
+#[derive(Debug)]
 pub struct People {
     walkers: Vec<Walker>,
     /// Seconds.
     now: Option<(f64, DVec2)>,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 struct Walker {
     person: Person,
     at: DVec2,

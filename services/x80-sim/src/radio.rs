@@ -13,7 +13,6 @@ const MOST_IN_FLIGHT: usize = 1024;
 /// Maximum wait of a datagram to follow or join the next.
 const LONGEST_HOLD_S: f64 = 0.5;
 
-#[derive(Clone, Debug)]
 struct Flight<W> {
     due: f64,
     way: W,
@@ -21,7 +20,6 @@ struct Flight<W> {
     held: Option<Hold>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Hold {
     Behind,
     Joined,
@@ -30,7 +28,6 @@ enum Hold {
 /// Simulated radio; `W` is a datagram's direction and peer.
 ///
 /// Good and outage periods are of exponentially distributed duration.
-#[derive(Clone, Debug)]
 pub struct Radio<W> {
     settings: mission::Radio,
     noise: Noise,

@@ -48,7 +48,7 @@ pub enum Heard {
 }
 
 /// Host's message in the robot's protocol.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(crate) enum Said<'a> {
     Frame(&'a Frame<'a>),
     Order(&'a Order),
@@ -81,7 +81,6 @@ impl Said<'_> {
     }
 }
 
-#[derive(Clone, Debug)]
 pub struct Robot {
     physics: Physics,
     simulation: Simulation,

@@ -12,7 +12,6 @@ use crate::{laser::Laser, world::World};
 /// Quality of each reading, 0 to 63. Nominal.
 const QUALITY: u8 = 47;
 
-#[derive(Clone, Debug)]
 pub struct Rplidar {
     pub laser: Laser,
     product: Product,

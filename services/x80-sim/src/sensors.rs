@@ -26,7 +26,6 @@ const CURRENT: (f64, f64) = (20.0, 0.2);
 /// motor's.
 pub const STALL_CURRENT: f64 = 1500.0;
 
-#[derive(Clone, Debug)]
 pub struct Ranging {
     front: usize,
     mounts: [Option<Mount>; SONARS],

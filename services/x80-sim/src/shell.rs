@@ -133,7 +133,6 @@ fn tell(reader: &mut Option<Box<dyn Write + Send>>, record: &impl Serialize) {
 }
 
 /// None in lockstep.
-#[derive(Clone, Copy, Debug)]
 struct SimClock {
     /// Machine time at mission time 0, and mission seconds per machine second.
     runs: Option<(u64, f64)>,

@@ -6,7 +6,6 @@ use crate::noise::{Noise, Source};
 
 /// Chain of two states per ranger, heard and silent, with a step per tick (E. N. Gilbert, "Capacity
 /// of a burst-noise channel", 1960).
-#[derive(Clone, Debug)]
 pub struct Silence {
     /// Probability of hearing the next reading.
     end: f64,

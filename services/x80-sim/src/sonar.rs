@@ -31,7 +31,7 @@ const NUDGE_M: f64 = 1e-6;
 const ABSORPTION_DB_PER_M: f64 = 1.3;
 const POST_RADIUS_M: f64 = 0.015;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy)]
 struct Candidate {
     range: f64,
     /// From the ranger, seen from above, metres.

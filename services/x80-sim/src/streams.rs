@@ -1,7 +1,7 @@
 use common::wire::{Request, Stream};
 
 /// Frames left of the standard, custom and motor stream; none for unlimited. All run from boot.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Default)]
 pub struct Streams([Option<u8>; 3]);
 
 impl Streams {

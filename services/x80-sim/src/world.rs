@@ -11,7 +11,7 @@ use crate::people::People;
 
 const TOUCHES_M: f64 = 1e-3;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy)]
 pub enum Surface {
     Drum {
         at: DVec2,
@@ -84,7 +84,7 @@ impl Surface {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy)]
 pub struct Solid {
     pub surface: Surface,
     pub profile: Profile,
@@ -129,7 +129,6 @@ impl Other {
     }
 }
 
-#[derive(Clone, Debug)]
 pub struct World {
     standing: Vec<Solid>,
     things: Vec<Visitor>,
@@ -141,7 +140,6 @@ pub struct World {
     pub heights: Heights,
 }
 
-#[derive(Clone, Debug)]
 struct Visitor {
     thing: Thing,
     solids: Vec<Solid>,

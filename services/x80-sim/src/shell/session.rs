@@ -33,7 +33,7 @@ const MOST_AT_ONCE: usize = 64;
 /// Interval of RPLIDAR messages: a serial adapter buffers for a few milliseconds.
 const GATHERS_S: f64 = 0.004;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq)]
 enum Leg {
     ToRobot(Source),
     ToHost(Source),

@@ -13,7 +13,7 @@ const MOST_SENDERS: usize = 16;
 const READINGS: usize = 3;
 
 /// Filter that admits only this user on this machine.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub struct OwnUser {
     senders: VecDeque<(SocketAddr, Instant, bool)>,
     told: bool,

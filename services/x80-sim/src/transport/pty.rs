@@ -18,7 +18,6 @@ use super::{Source, Wire};
 /// opening.
 const NOBODYS_BAUD: u32 = 50;
 
-#[derive(Debug)]
 pub struct Pty {
     robot: OwnedFd,
     /// Host's end, held open: reading the robot's end fails while no process holds it.

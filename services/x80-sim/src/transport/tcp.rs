@@ -8,7 +8,6 @@ use std::{
 
 use super::{Source, Wire};
 
-#[derive(Debug)]
 pub struct Tcp {
     listener: TcpListener,
     address: SocketAddr,

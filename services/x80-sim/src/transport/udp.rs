@@ -10,7 +10,6 @@ use super::{Source, Wire, owner::OwnUser};
 /// take several.
 pub const LONGEST: usize = 60_000;
 
-#[derive(Debug)]
 pub struct Udp {
     socket: UdpSocket,
     address: SocketAddr,
