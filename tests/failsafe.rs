@@ -156,7 +156,7 @@ fn a_frozen_supervisor_leads_to_a_robot_at_rest_and_a_thawed_one_lets_it_go_on()
 
 /// Returns whether this process and its children ignore `signal`. Under `nohup` they ignore SIGHUP.
 fn ignores(signal: Signal) -> bool {
-    let mask = process_status::field("self", "SigIgn").unwrap();
+    let mask = process_status::field("self/status", "SigIgn").unwrap();
     let mask = u64::from_str_radix(&mask, 16).unwrap();
     mask >> (signal.as_raw() - 1) & 1 == 1
 }

@@ -4,16 +4,17 @@ use std::{fs, time::Duration};
 
 use rustix::param::clock_ticks_per_second;
 
-pub fn field(process: &str, field: &str) -> Option<String> {
-    let status = fs::read_to_string(format!("/proc/{process}/status")).ok()?;
-    let mut lines = status.lines().filter_map(|line| line.split_once(':'));
+/// `file` is its path below `/proc`.
+pub fn field(file: &str, field: &str) -> Option<String> {
+    let fields = fs::read_to_string(format!("/proc/{file}")).ok()?;
+    let mut lines = fields.lines().filter_map(|line| line.split_once(':'));
     let (_, value) = lines.find(|(name, _)| *name == field)?;
     Some(value.trim().to_owned())
 }
 
 /// For example `VmRSS`.
-pub fn kibibytes(process: &str, field: &str) -> Option<u64> {
-    self::field(process, field)?.strip_suffix(" kB")?.trim().parse().ok()
+pub fn kibibytes(file: &str, field: &str) -> Option<u64> {
+    self::field(file, field)?.strip_suffix(" kB")?.trim().parse().ok()
 }
 
 /// Returns the times for which a thread ran and was runnable but waited. `task` is its path below

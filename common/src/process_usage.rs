@@ -43,7 +43,7 @@ impl Processes {
             let over = now.saturating_duration_since(at).as_secs_f64();
             used.saturating_sub(then).as_secs_f64() / over
         });
-        let memory_kib = kibibytes(&process.to_string(), "VmRSS");
+        let memory_kib = kibibytes(&format!("{process}/status"), "VmRSS");
         let usage = Usage { cpu, memory_bytes: memory_kib.map(|kib| kib.saturating_mul(1024)) };
         self.seen.insert(process, (now, used, usage));
         usage

@@ -63,7 +63,7 @@ impl Signals {
 }
 
 fn is_ignored(signal: c_int) -> bool {
-    let mask = process_status::field("self", "SigIgn")
+    let mask = process_status::field("self/status", "SigIgn")
         .and_then(|mask| u64::from_str_radix(&mask, 16).ok());
     mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
 }

@@ -103,7 +103,7 @@ fn report(arguments: &Arguments, field: &Field, took: Duration) -> Value {
         report["screening_cells"] = length.into();
     }
     // Memory after solving, without output files.
-    if let Some(peak) = kibibytes("self", "VmHWM") {
+    if let Some(peak) = kibibytes("self/status", "VmHWM") {
         report["peak_memory_bytes"] = (peak * 1024).into();
     }
     report

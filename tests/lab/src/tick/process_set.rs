@@ -27,7 +27,6 @@ pub struct ProcessSet {
     pss_kib: u64,
 }
 
-#[derive(Debug)]
 struct Counts {
     at: Instant,
     processes: BTreeSet<u32>,
@@ -48,7 +47,7 @@ impl ProcessSet {
             Some(first) if now.processes.is_subset(&first.processes) => {}
             _ => {
                 // Reading memory delays the process, so it happens once.
-                self.pss_kib = now.processes.iter().filter_map(|&process| pss_kib(process)).sum();
+                self.pss_kib = now.processes.iter().filter_map(pss_kib).sum();
                 self.first = Some(now);
                 self.last = None;
             }
@@ -87,21 +86,20 @@ impl Counts {
 fn waits(process: u32) -> Option<u64> {
     let threads = fs::read_dir(format!("/proc/{process}/task")).ok()?.flatten();
     let waits = |thread: fs::DirEntry| {
-        let thread = format!("{process}/task/{}", thread.file_name().display());
-        process_status::field(&thread, "voluntary_ctxt_switches")?.parse::<u64>().ok()
+        let status = format!("{process}/task/{}/status", thread.file_name().display());
+        process_status::field(&status, "voluntary_ctxt_switches")?.parse::<u64>().ok()
     };
     threads.map(waits).sum()
 }
 
 fn descends_from(process: u32, root: u32) -> bool {
-    let parent = |process: &u32| process_status::field(&process.to_string(), "PPid")?.parse().ok();
+    let parent =
+        |process: &u32| process_status::field(&format!("{process}/status"), "PPid")?.parse().ok();
     std::iter::successors(Some(process), parent).any(|it| it == root)
 }
 
-fn pss_kib(process: u32) -> Option<u64> {
-    let text = fs::read_to_string(format!("/proc/{process}/smaps_rollup")).ok()?;
-    let line = text.lines().find_map(|line| line.strip_prefix("Pss:"))?;
-    line.trim().strip_suffix(" kB")?.parse().ok()
+fn pss_kib(process: &u32) -> Option<u64> {
+    process_status::kibibytes(&format!("{process}/smaps_rollup"), "Pss")
 }
 
 #[cfg(test)]
