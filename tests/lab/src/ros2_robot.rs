@@ -246,8 +246,9 @@ impl Program {
             Content::Battery => {
                 report.battery_v.map(|volts| battery(Header::at(now_ns, ""), volts))
             }
-            Content::Hazards if report.touched.is_empty() => None,
-            Content::Hazards => Some(hazards(&report.touched, now_ns)),
+            Content::Hazards if !report.touched.is_empty() => {
+                Some(hazards(&report.touched, now_ns))
+            }
             _ => None,
         }
     }

@@ -3,7 +3,7 @@
 //! Only solid cells beside ground connected to the start matter. They are merged into boxes along
 //! runs of cells.
 
-use std::{collections::VecDeque, f64::consts::PI, path::Path};
+use std::{f64::consts::PI, path::Path};
 
 use common::geometry::Shapes;
 use glam::DVec2;
@@ -100,8 +100,8 @@ impl Floor {
     fn connected(&self, open: &[bool], from: Option<usize>) -> Vec<bool> {
         let cols = self.map.map.cols;
         let mut connected = vec![false; open.len()];
-        let mut next: VecDeque<usize> = from.into_iter().collect();
-        while let Some(cell) = next.pop_front() {
+        let mut next = Vec::from_iter(from);
+        while let Some(cell) = next.pop() {
             if open[cell] && !connected[cell] {
                 connected[cell] = true;
                 next.extend([cell - 1, cell + 1, cell - cols, cell + cols]);
