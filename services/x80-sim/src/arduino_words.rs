@@ -24,9 +24,9 @@ pub enum Request {
     /// `r`: count from 0.
     Reset,
     /// `m`: left and right, counts per run of the speed loop.
-    Speeds([i32; 2]),
+    Speeds([i16; 2]),
     /// `p`: the sonar on this pin.
-    Range(i32),
+    Range(i16),
     Baud,
     Unknown,
 }
@@ -37,8 +37,7 @@ impl Request {
         let text = String::from_utf8_lossy(line);
         let mut words = text.split(' ');
         let name = words.next().unwrap_or_default();
-        let mut number =
-            || words.next().and_then(|word| word.parse::<i16>().ok()).map_or(0, i32::from);
+        let mut number = || words.next().and_then(|word| word.parse().ok()).unwrap_or(0);
         match name {
             "e" => Self::Counts,
             "r" => Self::Reset,
@@ -72,7 +71,7 @@ impl Requests {
 pub struct ArduinoWords {
     board: ArduinoBoard,
     wheels: [OnChannel; 2],
-    sonars: Vec<(i32, usize)>,
+    sonars: Vec<(i16, usize)>,
     /// Counts that the board calls 0.
     zero: [f64; 2],
     /// Mission time in seconds; none after boot.
@@ -83,7 +82,7 @@ impl ArduinoWords {
     pub fn new(mission: &Mission) -> Self {
         let pins = &mission.robot.arduino.sonars;
         let table = mission.sensor_table().into_iter();
-        let pin = |name: &String| pins.get(name).copied().map(i32::from);
+        let pin = |name: &String| pins.get(name).copied().map(i16::from);
         let sonars = table.filter_map(|row| Some((pin(&row.name)?, usize::from(row.channel))));
         Self {
             board: mission.robot.arduino.clone(),
