@@ -92,7 +92,7 @@ impl People {
         }
     }
 
-    pub fn solids(&self) -> impl Iterator<Item = Solid> + '_ {
+    pub fn solids(&self) -> impl Iterator<Item = Solid> {
         let profile: Profile = Drum::default().profile();
         self.walkers.iter().map(move |Walker { at, person, .. }| Solid {
             surface: Surface::Drum { at: *at, radius: person.radius_m },

@@ -183,14 +183,14 @@ impl World {
         self.holes.iter().any(|hole| hole.contains(point))
     }
 
-    pub fn solids(&self) -> impl Iterator<Item = Solid> + '_ {
+    pub fn solids(&self) -> impl Iterator<Item = Solid> {
         let visiting = self.things.iter().filter(|visitor| visitor.present);
         let visiting = visiting.flat_map(Visitor::now).chain(self.people.solids());
         let visiting = visiting.chain(self.met.iter().copied());
         self.standing.iter().copied().chain(visiting)
     }
 
-    pub fn touchable(&self) -> impl Iterator<Item = Surface> + '_ {
+    pub fn touchable(&self) -> impl Iterator<Item = Surface> {
         let Heights { ground_clearance_m, body_top_m, .. } = self.heights;
         self.solids()
             .filter(move |solid| solid.profile.is_between(ground_clearance_m, body_top_m))
@@ -233,7 +233,7 @@ impl World {
 }
 
 impl Visitor {
-    fn now(&self) -> impl Iterator<Item = Solid> + '_ {
+    fn now(&self) -> impl Iterator<Item = Solid> {
         self.solids
             .iter()
             .map(|solid| Solid { surface: solid.surface.moved(self.offset), ..*solid })
