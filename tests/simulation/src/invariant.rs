@@ -212,7 +212,7 @@ impl Invariants {
         if sent == Some(true) {
             let drives = self.causes.last().is_some_and(|(_, cause)| cause.is_none());
             // A link that was killed in this turn sent, but did not publish why.
-            holds(drives || !machine.is_open(LINK), "zero command while held", || {
+            holds(drives || !machine.link_is_open(), "zero command while held", || {
                 "the link sends a motion command although its cause says stop".to_owned()
             })?;
             holds(may_move, "no command after the order to stop", || {

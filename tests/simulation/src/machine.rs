@@ -332,7 +332,7 @@ impl SimulatedMachine {
                 }
             }
             Event::ToRobot => {
-                let datagram = self.wires.borrow_mut().take_for_robot();
+                let datagram = self.wires.borrow_mut().take(Way::ToRobot);
                 if let Some((from, mut bytes)) = datagram {
                     if let Some(faults) = &self.faults {
                         bytes = faults.borrow_mut().order(&bytes);
@@ -345,7 +345,7 @@ impl SimulatedMachine {
             Event::Robot => self.with_robot(InMemory::pass),
             Event::Guard => {
                 self.running.set(GUARD);
-                let is_succeeded = self.is_open(LINK);
+                let is_succeeded = self.link_is_open();
                 self.guard.borrow_mut().turn(self.monotonic_ns(), is_succeeded);
             }
             Event::Turn(process) => self.turn(*process),
@@ -493,10 +493,10 @@ impl SimulatedMachine {
         live.next_back().map(|(number, _)| *number)
     }
 
-    /// Returns whether the stage's process has opened its topics.
-    pub fn is_open(&self, stage: &str) -> bool {
+    /// Returns whether the link's process has opened its topics.
+    pub fn link_is_open(&self) -> bool {
         let processes = self.processes.borrow();
-        processes.values().any(|it| it.stage == stage && it.is_live() && it.turns.is_some())
+        processes.values().any(|it| it.stage == LINK && it.is_live() && it.turns.is_some())
     }
 
     fn disturb(&self, what: &What) {

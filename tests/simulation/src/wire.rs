@@ -103,15 +103,15 @@ impl Wires {
         self.lanes[way as usize].under_way.front().map(|datagram| datagram.due_ns)
     }
 
-    /// Takes a datagram that has come to the robot, with its sender.
-    pub fn take_for_robot(&mut self) -> Option<(Port, Vec<u8>)> {
-        let Datagram { port, bytes, .. } = self.lane(Way::ToRobot).under_way.pop_front()?;
+    /// Takes a datagram that has come, with the port of its host's end.
+    pub fn take(&mut self, way: Way) -> Option<(Port, Vec<u8>)> {
+        let Datagram { port, bytes, .. } = self.lane(way).under_way.pop_front()?;
         Some((port, bytes))
     }
 
     /// Puts a datagram that has come to its host's end, unless that is closed.
     pub fn deliver_to_host(&mut self) {
-        if let Some(Datagram { port, bytes, .. }) = self.lane(Way::ToHost).under_way.pop_front()
+        if let Some((port, bytes)) = self.take(Way::ToHost)
             && let Some(inbox) = self.inboxes.get_mut(&port)
         {
             inbox.push_back(bytes);
