@@ -109,7 +109,7 @@ fn parse_hz(text: &str) -> Result<Hz, String> {
     }
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Serialize)]
 struct Times {
     of: &'static str,
     count: u64,

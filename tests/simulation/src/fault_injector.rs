@@ -36,7 +36,6 @@ const NO_READING: f64 = -1.0;
 /// Maximum stored messages: those of [`OLD`] at ten times the usual rate.
 const MOST_KEPT: usize = 1024;
 
-#[derive(Debug)]
 pub struct Late {
     pub at: Duration,
     pub bytes: Vec<u8>,

@@ -16,7 +16,7 @@ use crate::random::Random;
 /// pauses.
 const SHOWS_AFTER_S: f64 = 2.0;
 
-#[derive(Debug, PartialEq, Eq, Deserialize)]
+#[derive(PartialEq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Promise {
     /// The robot rests with a reason as soon as the failsafe's rule for the cause allows, stays at
@@ -31,7 +31,7 @@ pub enum Promise {
     EndsAtRest,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Deserialize)]
 pub struct Row {
     pub name: String,
     pub promise: Promise,
@@ -44,7 +44,7 @@ pub struct Row {
 const NOTHING: &str = "-";
 
 /// Fault of a robot's data, described by [`TABLE`] in the same order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RobotFault {
     Silence,

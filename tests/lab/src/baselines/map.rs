@@ -5,7 +5,6 @@ use glam::DVec2;
 const SIGHT_STEP: f64 = 0.1;
 
 /// Complete map whose hazard cells include the body's margin.
-#[derive(Clone, Copy, Debug)]
 pub struct Map<'a> {
     pub frame: GridFrame,
     cells: &'a [u8],

@@ -13,7 +13,6 @@ use crate::baselines::{map::Map, wavefront};
 /// method.
 const WAY_OUT_M_S: f64 = 0.08;
 
-#[derive(Clone, Copy)]
 pub enum Way {
     Unknown,
     To(DVec2),

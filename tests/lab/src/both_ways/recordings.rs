@@ -21,7 +21,6 @@ const TICK: usize = 4;
 const SEQUENCE: std::ops::Range<usize> = 24..28;
 const VALUE: usize = 28;
 
-#[derive(Clone, Copy)]
 enum Compared {
     /// Samples of each tick in order, without these fields. The sequence number is left out, and a
     /// repeated sample counts once: the link gives a tick again that is unanswered for 100 ms.

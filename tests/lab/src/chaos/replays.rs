@@ -12,7 +12,7 @@ use recording::{
 };
 use serde::Serialize;
 
-#[derive(Debug, Default, Serialize)]
+#[derive(Default, Serialize)]
 struct Counts {
     recordings: u64,
     /// Generations with bit-equal outputs.

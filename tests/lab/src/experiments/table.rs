@@ -20,7 +20,7 @@ pub const METHODS: [(&str, &[&str]); 2] = [
 ];
 const PAPER: &str = "paper";
 
-#[derive(Debug, Deserialize)]
+#[derive(Deserialize)]
 pub struct Experiment {
     pub name: String,
     pub title: String,
