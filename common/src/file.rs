@@ -92,10 +92,7 @@ pub fn reserved(path: &Path, length: u64) -> io::Result<fs::File> {
 }
 
 fn killed() -> io::Result<()> {
-    match machine::is_killed() {
-        true => Err(io::ErrorKind::BrokenPipe.into()),
-        false => Ok(()),
-    }
+    if machine::is_killed() { Err(io::ErrorKind::BrokenPipe.into()) } else { Ok(()) }
 }
 
 /// Replaces `file` so that a kill leaves the old or the new content.

@@ -245,9 +245,10 @@ impl<A: Answering> Stage for A {
 
     fn describe(Sample(input, further): &Sample<A::In, A::Further>) -> String {
         let name = A::INPUT.spec().name;
-        match <A::Further as Further>::Readers::FEEDBACK.is_empty() {
-            true => format!("{name} {input:?}"),
-            false => format!("{name} {input:?} with {further:?}"),
+        if <A::Further as Further>::Readers::FEEDBACK.is_empty() {
+            format!("{name} {input:?}")
+        } else {
+            format!("{name} {input:?} with {further:?}")
         }
     }
 }
@@ -282,16 +283,14 @@ impl<A: Answering> Process for Answers<A> {
     fn turn(&mut self) -> Result<Progress> {
         let Questions(input, further) = &mut self.readers;
         loop {
-            let next = match A::NEWEST_ONLY {
-                true => input.newest()?,
-                false => input.next_sample()?,
-            };
+            let next = if A::NEWEST_ONLY { input.newest()? } else { input.next_sample()? };
             let Some(sample) = next else {
                 return Ok(self.runner.out.at);
             };
-            let further = match self.runner.stage.has_answered(&sample) {
-                true => A::Further::default(),
-                false => A::Further::take_samples(further)?,
+            let further = if self.runner.stage.has_answered(&sample) {
+                A::Further::default()
+            } else {
+                A::Further::take_samples(further)?
             };
             self.runner.out.at = Progress::of(sample.stamp());
             if let Some(warning) = self.runner.take_entry(Sample(sample, further))? {

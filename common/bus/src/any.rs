@@ -51,9 +51,10 @@ impl<H: Stamped, E: Payload> AnyTopic for Topic<H, E> {
     }
 
     fn payload(&self) -> String {
-        match has_slice::<E>() {
-            true => format!("{} + [{}]", type_name::<H>(), type_name::<E>()),
-            false => type_name::<H>().to_owned(),
+        if has_slice::<E>() {
+            format!("{} + [{}]", type_name::<H>(), type_name::<E>())
+        } else {
+            type_name::<H>().to_owned()
         }
     }
 

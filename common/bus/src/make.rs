@@ -202,9 +202,10 @@ impl Bus {
             _ => return Ok(None),
         };
         let held = domain.joining().map_err(not_running(domain))?;
-        match self.is_replaced() {
-            false => Ok(Some(held)),
-            true => Err(not_running(domain)(io::ErrorKind::NotFound.into())),
+        if self.is_replaced() {
+            Err(not_running(domain)(io::ErrorKind::NotFound.into()))
+        } else {
+            Ok(Some(held))
         }
     }
 

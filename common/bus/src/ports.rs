@@ -54,9 +54,10 @@ impl<H: Payload, E: Payload> Publisher<H, E> {
     pub(super) fn send(&self, header: H, slice: &[E]) -> Result {
         let count = if has_slice::<E>() { slice.len() } else { 1 };
         self.raw.send(self.spec.name, count, &mut |loan| {
-            let place = match has_slice::<E>() {
-                true => loan.header.addr(),
-                false => loan.elements.as_mut_ptr().expose_provenance(),
+            let place = if has_slice::<E>() {
+                loan.header.addr()
+            } else {
+                loan.elements.as_mut_ptr().expose_provenance()
             };
             // SAFETY: uninitialised bytes are viewed as uninitialised `E`s where they are aligned
             // for it.
@@ -109,9 +110,10 @@ pub struct Slice<H, E = ()> {
 
 impl<H: Stamped, E: Payload> Slice<H, E> {
     pub fn header(&self) -> &H {
-        let place = match has_slice::<E>() {
-            true => self.raw.header().addr(),
-            false => self.raw.elements().as_ptr().expose_provenance(),
+        let place = if has_slice::<E>() {
+            self.raw.header().addr()
+        } else {
+            self.raw.elements().as_ptr().expose_provenance()
         };
         // SAFETY: the sample has an aligned `H` at this address, which does not change while the
         // sample is held.

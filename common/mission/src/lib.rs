@@ -307,9 +307,10 @@ keys! {
 
 impl Mission {
     pub fn waypoints(&self) -> Vec<Waypoint> {
-        match self.targets.is_empty() {
-            true => vec![Waypoint { at: self.target, heading_deg: None }],
-            false => self.targets.clone(),
+        if self.targets.is_empty() {
+            vec![Waypoint { at: self.target, heading_deg: None }]
+        } else {
+            self.targets.clone()
         }
     }
 
@@ -569,9 +570,10 @@ impl Mission {
     /// heavy base until the link identifies them.
     pub fn trusted_response(&self) -> Response {
         let Body { response, track_m, .. } = self.body();
-        match self.states_response() {
-            true => response,
-            false => self.robot.response.over(Response::careful(track_m), track_m),
+        if self.states_response() {
+            response
+        } else {
+            self.robot.response.over(Response::careful(track_m), track_m)
         }
     }
 

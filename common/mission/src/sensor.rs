@@ -290,9 +290,10 @@ impl Sensor {
     /// Returns the robot's angle towards a place at which it looks. For a laser that sees all
     /// around it is the bearing.
     pub fn faces_rad(&self) -> f64 {
-        match self.field_of_view_deg >= 360.0 {
-            true => self.mount.bearing_rad,
-            false => self.mount.looks_rad(),
+        if self.field_of_view_deg >= 360.0 {
+            self.mount.bearing_rad
+        } else {
+            self.mount.looks_rad()
         }
     }
 

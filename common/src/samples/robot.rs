@@ -90,9 +90,10 @@ impl Sweep {
     /// Returns the time of a beam among `beams` in a plausible sweep, relative to the tick.
     pub const fn beam_time_ns(&self, beam: usize, beams: usize) -> i64 {
         let (first, beams) = (self.first_beam as usize, if beams == 0 { 1 } else { beams });
-        let before = match self.beam_ns < 0 {
-            true => (first + beams - beam) % beams,
-            false => (beam + beams - first) % beams,
+        let before = if self.beam_ns < 0 {
+            (first + beams - beam) % beams
+        } else {
+            (beam + beams - first) % beams
         };
         self.first_beam_ns + self.beam_ns.abs() * before as i64
     }

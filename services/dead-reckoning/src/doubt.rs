@@ -171,11 +171,12 @@ impl Doubt {
             return None;
         }
         self.is_told = true;
-        let seen = match uneven > untold {
-            true => format!(
+        let seen = if uneven > untold {
+            format!(
                 "relative to the commands, the right wheel counts {told_ratio:.2} times as much as the left"
-            ),
-            false => "commands or ranges contradict the counts of the wheels".to_owned(),
+            )
+        } else {
+            "commands or ranges contradict the counts of the wheels".to_owned()
         };
         Some(format!(
             "{seen}, so the pose is uncertain by {:.1} m or more; check encoders and wheels",

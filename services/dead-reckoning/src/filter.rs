@@ -437,9 +437,10 @@ impl History {
         let at = later.unwrap_or(self.ticks.len() - 1);
         self.newest = self.again(motions, |place, tick, estimate| {
             let there = estimate.at(motions, tick, &fix);
-            match place != at || estimate.take(&fix, there) {
-                true => Ok(()),
-                false => Err(Refused { why: FixRefusal::Far, there: Some(there) }),
+            if place != at || estimate.take(&fix, there) {
+                Ok(())
+            } else {
+                Err(Refused { why: FixRefusal::Far, there: Some(there) })
             }
         })?;
         let at = self.ticks[at].time;

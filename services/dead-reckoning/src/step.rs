@@ -341,13 +341,15 @@ impl DeadReckoning {
         let way = estimate.position - pose.position;
         let turn = estimate.heading - pose.heading;
         let (most_m, most_rad) = MOST_CORRECTION;
-        pose.position = match relocated || way.length() <= most_m {
-            true => estimate.position,
-            false => pose.position + way.clamp_length_max(most_m),
+        pose.position = if relocated || way.length() <= most_m {
+            estimate.position
+        } else {
+            pose.position + way.clamp_length_max(most_m)
         };
-        pose.heading = match relocated || turn.abs() <= most_rad {
-            true => estimate.heading,
-            false => pose.heading + turn.clamp(-most_rad, most_rad),
+        pose.heading = if relocated || turn.abs() <= most_rad {
+            estimate.heading
+        } else {
+            pose.heading + turn.clamp(-most_rad, most_rad)
         };
     }
 
@@ -402,9 +404,10 @@ impl DeadReckoning {
         assert!(limit > 0.0);
         // The link reports restarts within its generation; only between two links must the counts
         // show one. A robot that turned back through its start gives the same counts, but sooner.
-        let restarted = match last.generation == wheels.stamp.generation {
-            true => last.restarts != wheels.restarts,
-            false => elapsed >= BOOTS_IN_S && counts.restarted_since(before),
+        let restarted = if last.generation == wheels.stamp.generation {
+            last.restarts != wheels.restarts
+        } else {
+            elapsed >= BOOTS_IN_S && counts.restarted_since(before)
         };
         if left.abs().max(right.abs()) > limit
             || restarted

@@ -176,9 +176,10 @@ fn scan_of(
     }
     let nanoseconds = |word: &str, seconds: Option<f64>| {
         let ns = seconds.unwrap_or_default() * 1e9;
-        match (0.0..=LONGEST_SWEEP_NS as f64).contains(&ns) {
-            true => Ok(ns.round() as i64),
-            false => Err(format!("the {word} of a scan is outside 0 to 2 s; send seconds")),
+        if (0.0..=LONGEST_SWEEP_NS as f64).contains(&ns) {
+            Ok(ns.round() as i64)
+        } else {
+            Err(format!("the {word} of a scan is outside 0 to 2 s; send seconds"))
         }
     };
     let beam_ns = nanoseconds("time", time_s)? / beams.len().max(1) as i64;

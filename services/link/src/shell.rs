@@ -261,9 +261,10 @@ impl Process for Shell {
             _ => None,
         };
         let restated = at(self.stated_ns + LINK.spec().restated_every().as_nanos() as u64);
-        let looks = match link.is_calm_until(restated) {
-            true => Duration::from_nanos(restated.machine_ns.saturating_sub(now.machine_ns)),
-            false => LOOKS_AGAIN,
+        let looks = if link.is_calm_until(restated) {
+            Duration::from_nanos(restated.machine_ns.saturating_sub(now.machine_ns))
+        } else {
+            LOOKS_AGAIN
         };
         Some(until_due.map_or(looks, |until| until.min(looks)))
     }

@@ -170,10 +170,7 @@ impl Link {
     /// Returns the evidence against the robot; none in lockstep, whose repeated frames are not
     /// judged.
     pub(crate) fn doubts(&self) -> DoubtsSample {
-        match self.in_ticks() {
-            true => DoubtsSample::default(),
-            false => self.failsafe.doubts(),
-        }
+        if self.in_ticks() { DoubtsSample::default() } else { self.failsafe.doubts() }
     }
 
     pub fn restore(&mut self, state: State) {

@@ -245,9 +245,10 @@ fn sweep_of(scan: &Scan, sensor: &Sensor) -> Sweep {
     }
     let measured_first = if scan.is_reversed { scan.ranges.len().saturating_sub(1) } else { 0 };
     let first = first + measured_first as f64 * step;
-    let first_beam = match is_same_fan(scan, sensor) {
-        true => measured_first as u64,
-        false => ((first - its_first) / its_step).round().rem_euclid(sensor.beams as f64) as u64,
+    let first_beam = if is_same_fan(scan, sensor) {
+        measured_first as u64
+    } else {
+        ((first - its_first) / its_step).round().rem_euclid(sensor.beams as f64) as u64
     };
     Sweep { first_beam_ns: 0, beam_ns: beam_ns as i64, first_beam }
 }

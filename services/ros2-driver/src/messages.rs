@@ -152,10 +152,8 @@ pub fn read_hazards(payload: &[u8]) -> Result<Vec<String>, Malformed> {
 /// Returns whether a `geometry_msgs/Twist` or, if `stamped`, `TwistStamped` moves a robot, as NaN
 /// does. Fails otherwise.
 pub fn read_moves(payload: &[u8], stamped: bool) -> Result<bool, Malformed> {
-    let twist = match stamped {
-        true => TwistStamped::decode(payload)?.twist,
-        false => Twist::decode(payload)?,
-    };
+    let twist =
+        if stamped { TwistStamped::decode(payload)?.twist } else { Twist::decode(payload)? };
     Ok(twist != Twist::default())
 }
 
@@ -163,8 +161,9 @@ pub fn read_moves(payload: &[u8], stamped: bool) -> Result<bool, Malformed> {
 /// stop must never expire.
 pub fn write_twist(ahead: f64, turn: f64, stamped: bool) -> Vec<u8> {
     let twist = twist([ahead, turn]);
-    match stamped {
-        true => TwistStamped { twist, ..TwistStamped::default() }.encode(),
-        false => twist.encode(),
+    if stamped {
+        TwistStamped { twist, ..TwistStamped::default() }.encode()
+    } else {
+        twist.encode()
     }
 }

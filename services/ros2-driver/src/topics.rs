@@ -55,9 +55,10 @@ impl Topics {
             let kind = "irobot_create_msgs::msg::dds_::HazardDetectionVector_";
             hear(Content::Hazards, &hazards, kind);
         }
-        let command = match topics.stamped {
-            true => "geometry_msgs::msg::dds_::TwistStamped_",
-            false => "geometry_msgs::msg::dds_::Twist_",
+        let command = if topics.stamped {
+            "geometry_msgs::msg::dds_::TwistStamped_"
+        } else {
+            "geometry_msgs::msg::dds_::Twist_"
         };
         let command = Topic::new(&topics.cmd_vel, command);
         heard.push((Content::Command, command.clone()));

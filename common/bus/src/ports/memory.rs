@@ -93,9 +93,10 @@ impl Sample {
 
 /// Returns an error once the running process is killed.
 pub(super) fn alive(topic: &'static str) -> Result {
-    match machine::is_killed() {
-        true => Err(BusError::Refused { action: "use", topic, detail: "killed".to_owned() }),
-        false => Ok(()),
+    if machine::is_killed() {
+        Err(BusError::Refused { action: "use", topic, detail: "killed".to_owned() })
+    } else {
+        Ok(())
     }
 }
 

@@ -172,9 +172,10 @@ pub struct Carried {
 
 impl Carried {
     pub(crate) fn of<H: Payload, E: Payload>() -> Self {
-        let (header, element, elements) = match has_slice::<E>() {
-            true => (Type::of::<H>(), Type::of::<E>(), TypeVariant::Dynamic),
-            false => (Type::of::<E>(), Type::of::<H>(), TypeVariant::FixedSize),
+        let (header, element, elements) = if has_slice::<E>() {
+            (Type::of::<H>(), Type::of::<E>(), TypeVariant::Dynamic)
+        } else {
+            (Type::of::<E>(), Type::of::<H>(), TypeVariant::FixedSize)
         };
         let layout = crc32fast::hash(format!("{:?}", (H::kind(), E::kind())).as_bytes());
         Self { header, element, elements, layout }

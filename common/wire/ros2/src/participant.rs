@@ -65,14 +65,13 @@ pub struct Quality {
 
 impl Quality {
     fn policies(self) -> QosPolicies {
-        let reliability = match self.is_reliable {
-            true => Reliability::Reliable { max_blocking_time: Duration::ZERO },
-            false => Reliability::BestEffort,
+        let reliability = if self.is_reliable {
+            Reliability::Reliable { max_blocking_time: Duration::ZERO }
+        } else {
+            Reliability::BestEffort
         };
-        let durability = match self.is_latched {
-            true => Durability::TransientLocal,
-            false => Durability::Volatile,
-        };
+        let durability =
+            if self.is_latched { Durability::TransientLocal } else { Durability::Volatile };
         QosPolicyBuilder::new()
             .reliability(reliability)
             .durability(durability)

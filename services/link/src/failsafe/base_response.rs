@@ -67,9 +67,10 @@ impl BaseResponse {
             ));
         }
         let stated = self.stated;
-        let until_then = match self.brakes_by_response {
-            true => "until then each run measures it again",
-            false => "until then it drives at half speed, because it stops later than stated",
+        let until_then = if self.brakes_by_response {
+            "until then each run measures it again"
+        } else {
+            "until then it drives at half speed, because it stops later than stated"
         };
         Some(format!(
             "{answers}, but {:.2} s and {} m/s^2 are stated; find what delays commands or frames, or give delay_s = {delay_s:.2} and acceleration_m_s2 = {acceleration_m_s2:.2} in [robot.response] ({until_then})",

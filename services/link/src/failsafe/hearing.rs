@@ -258,9 +258,10 @@ impl Hearing {
             return None;
         }
         let Memory { frames, way_m, .. } = memory;
-        let when = match memory.ends.is_in_motion() {
-            true => format!("has heard anything while the robot moved, {SPELLS} times"),
-            false => format!("has heard anything in {frames} frames and {way_m:.1} m"),
+        let when = if memory.ends.is_in_motion() {
+            format!("has heard anything while the robot moved, {SPELLS} times")
+        } else {
+            format!("has heard anything in {frames} frames and {way_m:.1} m")
         };
         Some(format!(
             "no ranging sensor {when}: the ground is open, or the sensors are deaf; check their supply and cable, then run `firsthand stop` and `resume`"

@@ -71,9 +71,10 @@ impl Staying {
     fn take(&mut self, value: Value, band_m: f64) {
         let least = [0, 1, 2].map(|it| self.least[it].min(value[it]));
         let most = [0, 1, 2].map(|it| self.most[it].max(value[it]));
-        *self = match self.readings > 0 && most[0] - least[0] <= band_m {
-            true => Self { readings: self.readings + 1, least, most },
-            false => Self { readings: 1, least: value, most: value },
+        *self = if self.readings > 0 && most[0] - least[0] <= band_m {
+            Self { readings: self.readings + 1, least, most }
+        } else {
+            Self { readings: 1, least: value, most: value }
         };
     }
 

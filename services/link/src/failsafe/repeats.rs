@@ -72,10 +72,8 @@ impl Repeats {
                 let chance = (count as f64 / LAGS as f64).min(REPEATED);
                 let sums = self.sums.iter_mut().zip(repeats).zip(has_moved);
                 for ((sum, repeats), _) in sums.filter(|(_, has_moved)| *has_moved) {
-                    let ratio = match repeats {
-                        true => REPEATED / chance,
-                        false => (1.0 - REPEATED) / (1.0 - chance),
-                    };
+                    let ratio =
+                        if repeats { REPEATED / chance } else { (1.0 - REPEATED) / (1.0 - chance) };
                     *sum = (*sum + ratio.ln()).clamp(0.0, 2.0 * LIMITS[1]);
                 }
             }

@@ -84,9 +84,10 @@ impl Sums {
         let alone = line.factor(self.ticks);
         match Two::of(line, &change, self.both, self.ticks, 0.0) {
             Some(Two { a: [ratio, deviation], .. }) if self.way_m >= LEAST_M => {
-                let (ratio, deviation) = match (alone.0 - 1.0).abs() < (ratio - 1.0).abs() {
-                    true => alone,
-                    false => (ratio, deviation),
+                let (ratio, deviation) = if (alone.0 - 1.0).abs() < (ratio - 1.0).abs() {
+                    alone
+                } else {
+                    (ratio, deviation)
                 };
                 assert!(deviation >= 0.0);
                 WheelRatio { ratio, deviation }

@@ -79,9 +79,10 @@ impl Link {
     /// Returns whether a stop is due. A silent robot may receive, so it gets one with each ping.
     fn is_stop_due(&self) -> bool {
         const { assert!(STOP_AGAINST_OTHERS.as_millis() < STOP_AGAIN.as_millis()) };
-        match self.connected() {
-            true => self.passed(self.stop_sent_ns, STOP_AGAIN),
-            false => self.pinged_ns == Some(self.now_ns) && self.stop_sent_ns != Some(self.now_ns),
+        if self.connected() {
+            self.passed(self.stop_sent_ns, STOP_AGAIN)
+        } else {
+            self.pinged_ns == Some(self.now_ns) && self.stop_sent_ns != Some(self.now_ns)
         }
     }
 
