@@ -140,10 +140,9 @@ fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<Option<(u64, T)>, String>
     let Some((sequence, body)) = whole(bytes) else {
         return Ok(None);
     };
-    match postcard::from_bytes(body) {
-        Ok(state) => Ok(Some((sequence, state))),
-        Err(error) => Err(format!("its state cannot be decoded: {error}")),
-    }
+    let state = postcard::from_bytes(body);
+    let undecoded = |error| format!("its state cannot be decoded: {error}");
+    Ok(Some((sequence, state.map_err(undecoded)?)))
 }
 
 pub(crate) fn other_version(found: u8) -> String {

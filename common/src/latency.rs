@@ -42,19 +42,14 @@ impl Histogram {
     pub fn quantile_us(&self, share: f64) -> Option<f64> {
         assert!((0.0..=1.0).contains(&share));
         let total = self.total();
-        if total == 0 {
-            return None;
-        }
-        let rank = ((total as f64 * share).ceil() as u64).clamp(1, total);
+        let rank = ((total as f64 * share).ceil() as u64).min(total).max(1);
         let mut seen = 0;
-        for (bucket, &count) in self.counts.iter().enumerate() {
+        let bucket = self.counts.iter().position(|&count| {
             seen += u64::from(count);
-            if seen >= rank {
-                let end = ((bucket + 1) as f64 / PER_OCTAVE).exp2();
-                return Some(end.min(self.max_ns as f64 / 1e3));
-            }
-        }
-        None
+            seen >= rank
+        })?;
+        let end = ((bucket + 1) as f64 / PER_OCTAVE).exp2();
+        Some(end.min(self.max_ns as f64 / 1e3))
     }
 }
 

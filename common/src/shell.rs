@@ -121,8 +121,7 @@ pub trait Process: Sized {
     fn turn(&mut self) -> Result<Progress>;
 
     /// Opens resources that no process waits for. Called once, after the first ready heartbeat.
-    fn after_ready(&mut self, context: &mut Context) -> Result {
-        let _ = context;
+    fn after_ready(&mut self, _context: &mut Context) -> Result {
         Ok(())
     }
 
@@ -147,8 +146,7 @@ pub trait Process: Sized {
 
     /// Injects a fault. Returns false if the stage has no such fault, or nothing to inject it into
     /// yet.
-    fn inject(&mut self, fault: FaultKind) -> Result<bool> {
-        let _ = fault;
+    fn inject(&mut self, _fault: FaultKind) -> Result<bool> {
         Ok(false)
     }
 

@@ -63,8 +63,7 @@ pub trait Stage: Sized + 'static {
 
     /// Publishes outputs that no stage waits for. A process calls this in a pause, a replay after
     /// each entry.
-    fn publish_rest(&mut self, out: &mut Outputs) -> Result {
-        let _ = out;
+    fn publish_rest(&mut self, _out: &mut Outputs) -> Result {
         Ok(())
     }
 

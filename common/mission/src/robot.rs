@@ -1,4 +1,4 @@
-use std::{collections::BTreeMap, path::PathBuf, sync::LazyLock};
+use std::{collections::BTreeMap, f64::consts::TAU, path::PathBuf, sync::LazyLock};
 
 use crate::{
     arduino::ArduinoBoard,
@@ -168,12 +168,12 @@ pub struct Steering {
 
 impl Steering {
     pub fn angle(&self, counts: f64) -> f64 {
-        counts * std::f64::consts::TAU / self.counts_per_turn
+        counts * TAU / self.counts_per_turn
     }
 
     /// Converts a steering `angle`, radians, to counts; a rate becomes counts per second.
     pub fn counts(&self, angle: f64) -> f64 {
-        angle * self.counts_per_turn / std::f64::consts::TAU
+        angle * self.counts_per_turn / TAU
     }
 }
 
@@ -237,7 +237,7 @@ impl Body {
     }
 
     pub fn metres_per_count(&self) -> f64 {
-        std::f64::consts::TAU * self.wheel_radius_m / self.counts_per_turn
+        TAU * self.wheel_radius_m / self.counts_per_turn
     }
 }
 

@@ -14,17 +14,11 @@ const COMPARED_NS: i64 = 10_000_000_000;
 const AGREES_WITHIN: f64 = 2.0;
 
 /// Sequence of turns per tick. A turn after a gap only marks where the next one begins.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Turns<T> {
     /// End of the newest turn; `None` after a gap.
     told: Option<T>,
     sequence: u64,
-}
-
-impl<T> Default for Turns<T> {
-    fn default() -> Self {
-        Self { told: None, sequence: 0 }
-    }
 }
 
 impl<T: Copy> Turns<T> {

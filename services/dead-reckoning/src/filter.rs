@@ -3,7 +3,7 @@
 //! [`Filter`] is the estimate at one tick. [`History`] holds the estimate of 2 s ago, and ticks and
 //! fixes since. A late fix applies at its own time: the estimate is recomputed from there.
 
-use std::{collections::VecDeque, fmt, time::Duration};
+use std::{collections::VecDeque, f64::consts::TAU, fmt, time::Duration};
 
 use common::{
     clock::MissionTime,
@@ -147,7 +147,7 @@ impl Fix {
 
 /// Wraps an angle to -pi..pi.
 pub(crate) fn wrapped(turn: f64) -> f64 {
-    turn - (turn / std::f64::consts::TAU).round() * std::f64::consts::TAU
+    turn - (turn / TAU).round() * TAU
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -9,7 +9,7 @@ use common::{
     found_response::if_there,
     kinematics::{Drive, Pose2, Twist},
     mission::{Body, Mission},
-    samples::{CountsSample, FixRefusal, FixSample, PlaceSample, PoseSample, WheelSample},
+    samples::{CountsSample, FixRefusal, PlaceSample, PoseSample, WheelSample},
     stage::{Answer, Answering, ForeignState},
     topics::{POSE, WHEELS},
     wire::{COUNT_CYCLE, counts_between},
@@ -80,7 +80,7 @@ impl State {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Last {
     tick: u64,
     time: MissionTime,
@@ -236,10 +236,11 @@ impl DeadReckoning {
             self.place(place);
         }
         let (mut relocated, mut by_scan, mut refused, mut disagree) = (false, false, None, None);
-        for fix in fixes {
+        for sample in fixes {
+            let fix = Fix::try_from(sample);
             let taken = self.take_fix(fix);
             by_scan |= taken == Taken::UsedScan;
-            if let Ok(fix) = Fix::try_from(fix) {
+            if let Ok(fix) = fix {
                 let State { disagreement, history, .. } = &mut self.state;
                 let found = disagreement.compare(&fix, &history.ticks, self.body.track_m);
                 disagree = found.or(disagree);
@@ -301,12 +302,11 @@ impl DeadReckoning {
         }
     }
 
-    fn take_fix(&mut self, sample: &FixSample) -> Taken {
+    fn take_fix(&mut self, fix: Result<Fix, FixRefusal>) -> Taken {
         let state = &mut self.state;
-        let fix = Fix::try_from(sample);
         let taken = fix.map_err(|why| Refused { why, there: None });
         let taken = taken.and_then(|fix| state.history.take(&self.motions, fix).map(|()| fix));
-        let (why, there) = match taken {
+        let Refused { why, there } = match taken {
             Ok(used) => {
                 state.fixes += 1;
                 state.contradictions.settle(&used);
@@ -315,7 +315,7 @@ impl DeadReckoning {
                 }
                 return if used.is_by_scan() { Taken::UsedScan } else { Taken::Used };
             }
-            Err(Refused { why, there }) => (why, there),
+            Err(refused) => refused,
         };
         state.fixes_refused += 1;
         let estimate = &state.history.newest;
@@ -450,8 +450,7 @@ impl DeadReckoning {
     fn sample(&self) -> PoseSample {
         let State { pose, odometry, history, last, .. } = &self.state;
         let Pose2 { position, heading } = *pose;
-        let (left_counts, right_counts, v, omega) =
-            last.map_or((0, 0, 0.0, 0.0), |last| (last.left, last.right, last.v, last.omega));
+        let Last { left, right, v, omega, .. } = last.unwrap_or_default();
         let estimate = &history.newest;
         // The error is the estimate's, plus the offset to it.
         let [x, y] = (estimate.pose.position - position).to_array();
@@ -477,8 +476,8 @@ impl DeadReckoning {
             omega_rad_s: omega,
             travelled_m: self.state.travelled,
             covariance,
-            left_counts,
-            right_counts,
+            left_counts: left,
+            right_counts: right,
             map_from_odom: [origin.x, origin.y, turned],
             relocations: self.state.relocations + self.state.placed,
             fixes: self.state.fixes,

@@ -15,7 +15,7 @@ use common::{
     latency::Histogram,
     machine, readers,
     samples::{Action, Cause, CommandSample, DirectiveSample, LinkSample, TickLimitSample},
-    shell::{Context, Process, Progress, StageError},
+    shell::{Context, Process, Progress, Result, StageError},
     stage::Runner,
     stop_socket::{Identity, OwedStop, Request, StopMark, StopSocket},
     topics::{
@@ -107,7 +107,7 @@ impl Process for Shell {
     const PERSISTS: Persists = Persists::State(MEMORY_BYTES);
     type Readers = Inputs;
 
-    fn open(context: &mut Context, inputs: Inputs) -> Result<Self, StageError> {
+    fn open(context: &mut Context, inputs: Inputs) -> Result<Self> {
         // The guard identifies this link by its socket, so that comes first.
         let domain = context.run.robot.domain();
         let is_real = !machine::is_simulated();
@@ -131,7 +131,7 @@ impl Process for Shell {
                 let address = address.map_err(|error| StageError::Other(error.to_string()))?;
                 Ok(Transport::open(&address.unwrap_or(context.run.address.clone()), sensor.line)?)
             })
-            .collect::<Result<Vec<_>, StageError>>()?;
+            .collect::<Result<Vec<_>>>()?;
         let all = std::iter::once(&transport).chain(&wires);
         for wire in all.filter_map(Transport::descriptor) {
             context.waiter.on_readable(wire)?;
@@ -170,7 +170,7 @@ impl Process for Shell {
         Ok(shell)
     }
 
-    fn turn(&mut self) -> Result<Progress, StageError> {
+    fn turn(&mut self) -> Result<Progress> {
         self.take_operators_requests()?;
         self.maintain()?;
         if let Some(directive) = self.inputs.directive.newest()? {
@@ -226,7 +226,7 @@ impl Process for Shell {
         Ok(self.runner.out.at)
     }
 
-    fn after_ready(&mut self, context: &mut Context) -> Result<(), StageError> {
+    fn after_ready(&mut self, context: &mut Context) -> Result {
         self.has_telemetry = true;
         self.runner.open_late(context)
     }
@@ -269,14 +269,14 @@ impl Process for Shell {
         Some(until_due.map_or(looks, |until| until.min(looks)))
     }
 
-    fn idle(&mut self) -> Result<(), StageError> {
+    fn idle(&mut self) -> Result {
         if self.has_idle_work() {
             self.take(Event::Telemetry)?;
         }
         Ok(())
     }
 
-    fn stop(&mut self) -> Result<(), StageError> {
+    fn stop(&mut self) -> Result {
         self.take(Event::End)?;
         self.runner.publish_rest()?;
         tracing::info!("stop sent to the robot");
@@ -317,7 +317,7 @@ fn log_decision(before: Decision, now: Decision) {
 }
 
 impl Shell {
-    fn take_operators_requests(&mut self) -> Result<(), StageError> {
+    fn take_operators_requests(&mut self) -> Result {
         while let Some(request) = self.stop_socket.as_mut().and_then(StopSocket::take) {
             if matches!(request, Request::Stop | Request::Resume) {
                 tracing::warn!(?request, "an operator sent a request to the link directly");
@@ -370,7 +370,7 @@ impl Shell {
         }
     }
 
-    fn maintain(&mut self) -> Result<(), StageError> {
+    fn maintain(&mut self) -> Result {
         let now_ns = monotonic_ns();
         if let Some(open) = self.transport.maintain(now_ns)? {
             self.take(Event::Wire(open))?;
@@ -383,14 +383,14 @@ impl Shell {
         Ok(())
     }
 
-    fn take(&mut self, event: Event<'_>) -> Result<(), StageError> {
+    fn take(&mut self, event: Event<'_>) -> Result {
         let machine_ns = monotonic_ns();
         let now = self.clock.at(self.runner.stage.link.state.next_tick, machine_ns);
         let effects = self.runner.take_entry(Entry { event, machine_ns, now })?;
         self.carry_out(effects)
     }
 
-    fn carry_out(&mut self, effects: Vec<Effect>) -> Result<(), StageError> {
+    fn carry_out(&mut self, effects: Vec<Effect>) -> Result {
         self.mark_owed_stop();
         for effect in effects {
             match effect {
@@ -477,7 +477,7 @@ impl Shell {
         Ok(())
     }
 
-    fn state(&mut self) -> Result<(), StageError> {
+    fn state(&mut self) -> Result {
         let now_ns = monotonic_ns();
         self.stated_ns = now_ns;
         let link = &self.runner.stage.link;

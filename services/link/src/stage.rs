@@ -9,7 +9,7 @@ use common::{
     },
     shell::{Context, Progress},
     stage::{ForeignState, Stage},
-    start::StageError,
+    start::Result,
     topics::{
         BASE_RESPONSE, CONTACT, COUNTS, DOUBTS, IMU_TURN, INFRARED, POWER, RANGES, SCAN,
         SURROUNDINGS, WHEELS, WIRE, WIRE_PIECE,
@@ -52,7 +52,7 @@ impl LinkStage {
         effect: Effect,
         machine_ns: u64,
         out: &mut Outputs,
-    ) -> Result<Option<Effect>, StageError> {
+    ) -> Result<Option<Effect>> {
         match effect {
             Effect::Tick {
                 tick,
@@ -95,7 +95,7 @@ impl LinkStage {
         Ok(None)
     }
 
-    fn publish_telemetry(&mut self, out: &mut Outputs) -> Result<(), StageError> {
+    fn publish_telemetry(&mut self, out: &mut Outputs) -> Result {
         out.publish(&INFRARED, self.infrared.take())?;
         out.publish(&POWER, self.power.take())?;
         out.publish(&SURROUNDINGS, self.surroundings.take())
@@ -121,7 +121,7 @@ impl Stage for LinkStage {
         }
     }
 
-    fn start(&self, context: &mut Context) -> Result<State, StageError> {
+    fn start(&self, context: &mut Context) -> Result<State> {
         Ok(State::new(context.run.clock, context.generation.first_tick))
     }
 
@@ -130,11 +130,7 @@ impl Stage for LinkStage {
         Ok(())
     }
 
-    fn take_entry(
-        &mut self,
-        entry: Entry<'_>,
-        out: &mut Outputs,
-    ) -> Result<Vec<Effect>, StageError> {
+    fn take_entry(&mut self, entry: Entry<'_>, out: &mut Outputs) -> Result<Vec<Effect>> {
         match entry.event {
             Event::Datagram(bytes) => {
                 self.carry(out.at, bytes, entry.machine_ns, Direction::Received);
@@ -153,7 +149,7 @@ impl Stage for LinkStage {
         Ok(left)
     }
 
-    fn publish_rest(&mut self, out: &mut Outputs) -> Result<(), StageError> {
+    fn publish_rest(&mut self, out: &mut Outputs) -> Result {
         let now = out.at;
         for (at, header, bytes) in self.wire.drain(..) {
             out.at = at;

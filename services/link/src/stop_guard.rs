@@ -24,7 +24,7 @@ use common::{
     poll,
     run::Run,
     samples::{HoldReason, Order, Rest},
-    shell::StageError,
+    shell::{Result, StageError},
     stop_socket::{Identity, OwedStop, Request, StopSocket},
 };
 use rustix::process::setsid;
@@ -82,7 +82,7 @@ pub fn spawn(
 }
 
 /// Guards the robot of the link with this socket; standard input closes with the link.
-pub fn run(directory: &Path, link: &Identity) -> Result<(), StageError> {
+pub fn run(directory: &Path, link: &Identity) -> Result {
     // The link's session may end with it or its terminal.
     let _ = setsid();
     // The directory may vanish with the link.
@@ -131,7 +131,7 @@ struct Guard<'a> {
 
 impl Guard<'_> {
     /// Orders the stop until the guard leaves. Fails when the wire is unusable.
-    fn order_stop(&mut self, is_succeeded: &dyn Fn() -> bool) -> Result<(), StageError> {
+    fn order_stop(&mut self, is_succeeded: &dyn Fn() -> bool) -> Result {
         let run = self.run;
         let mut orders = Orders::open(run)?;
         loop {
@@ -191,7 +191,7 @@ pub struct Orders {
 }
 
 impl Orders {
-    pub fn open(run: &Run) -> Result<Self, StageError> {
+    pub fn open(run: &Run) -> Result<Self> {
         let transport = Transport::of_base(&run.address, &run.mission)?;
         let mut link = Link::new(&run.mission);
         link.restore(State::new(run.clock, 0));
@@ -202,7 +202,7 @@ impl Orders {
     ///
     /// # Errors
     /// If the wire is unusable.
-    pub fn turn(&mut self, now_ns: u64) -> Result<Rest, StageError> {
+    pub fn turn(&mut self, now_ns: u64) -> Result<Rest> {
         let Self { transport, link, clock } = self;
         let mut effects = Vec::new();
         let now = clock.at(0, now_ns);

@@ -1,7 +1,7 @@
 //! Tests of fixes and a gyro with a robot of known errors.
 
 use super::{tests::reckoning_of, *};
-use common::samples::{Stamp, TurnSample};
+use common::samples::{FixSample, Stamp, TurnSample};
 use glam::dvec2;
 
 const TICK_NS: u64 = 100_000_000;

@@ -58,9 +58,7 @@ impl LatencyMonitor {
             State::Testing(since) if has_passed(since, now_ns, self.window) => {
                 self.state = if self.came_late { State::Late(now_ns) } else { State::Timely };
             }
-            State::Late(since) if has_passed(since, now_ns, self.again) => {
-                self.test(now_ns);
-            }
+            State::Late(since) if has_passed(since, now_ns, self.again) => self.test(now_ns),
             _ => {}
         }
     }

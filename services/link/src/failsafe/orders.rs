@@ -62,15 +62,15 @@ impl Monitor for Orders {
     }
 
     fn condition(&self, cause: Cause, now: Moment) -> Condition {
-        let age = |directive: Directive| now.machine_ns.saturating_sub(directive.heard_ns);
+        let age = |directive: Directive| {
+            Duration::from_nanos(now.machine_ns.saturating_sub(directive.heard_ns))
+        };
         let held = self.newest.filter(|newest| newest.order == Order::Hold);
         let holds = match (cause, held.map(|directive| directive.reason)) {
             (Cause::MissionOver, _) => self.is(Order::Stop),
             (Cause::OperatorStop, held) => self.stopped_here || held == Some(HoldReason::Operator),
             (Cause::StageHeld, held) => held == Some(HoldReason::StageHeld),
-            (Cause::SupervisorSilent, _) => self
-                .newest
-                .is_some_and(|newest| u128::from(age(newest)) > SUPERVISOR_SILENT.as_nanos()),
+            (Cause::SupervisorSilent, _) => self.newest.map(age) > Some(SUPERVISOR_SILENT),
             (_, Some(HoldReason::Operator | HoldReason::StageHeld)) => false,
             (_, held) => held.is_some() || self.newest.is_none(),
         };

@@ -8,7 +8,11 @@
 //! Readings must also follow from one another while the robot hardly turns. Healthy sensors break
 //! this in up to 0.45 of readings for long, random ones in 0.7 to 0.9. Page's test tells them apart.
 
-use std::{f64::consts::TAU, ops::RangeInclusive, time::Duration};
+use std::{
+    f64::consts::{FRAC_PI_2, TAU},
+    ops::RangeInclusive,
+    time::Duration,
+};
 
 use common::{
     clock::MissionTime,
@@ -33,7 +37,7 @@ const BANDS_M: [f64; 2] = [0.0202, 0.0702];
 const READINGS: u32 = 8;
 /// Distance, metres, or turn, radians, that must change a reading. Fractions add up.
 const WAY_M: f64 = 0.4;
-const TURN_RAD: f64 = std::f64::consts::FRAC_PI_2;
+const TURN_RAD: f64 = FRAC_PI_2;
 /// Multiple of that motion, over twice the readings, that is sure in the wider band.
 const SURE: f64 = 1.8;
 /// Judged ranges, metres. Ends of a scale are limits, not distances.
@@ -153,7 +157,9 @@ impl Row {
         }
         let is_so = self.is_implausible();
         for (at, is_so) in self.implausible.iter_mut().zip(is_so) {
-            *at = if is_so { Some(now) } else { *at };
+            if is_so {
+                *at = Some(now);
+            }
         }
         if is_so[0] {
             self.words = self.words();
