@@ -74,8 +74,7 @@ fn wait_for_place(bus: &Bus, stage: &str) -> Result<(u64, OwnedFd)> {
     let mut taken: Option<(Instant, u32)> = None;
     let place = Roster::open(bus)?.find(PATIENCE, |header, entries| {
         if header.order() == Order::Stop {
-            let error = StageError::Other("the robot is being stopped".to_owned());
-            return Some(Err(error));
+            return Some(Err(StageError::Other("the robot is being stopped".to_owned())));
         }
         let entry = entries.iter().find(|entry| name_str(&entry.stage) == stage)?;
         if entry.pid == 0 {

@@ -130,8 +130,7 @@ pub fn read_text(file: &Path) -> io::Result<String> {
     if !machine.files().exists(file) {
         return Err(io::ErrorKind::NotFound.into());
     }
-    let content = machine.files().open(file).borrow().clone();
-    String::from_utf8(content).map_err(io::Error::other)
+    String::from_utf8(machine.files().open(file).borrow().clone()).map_err(io::Error::other)
 }
 
 /// Links count, too.

@@ -38,8 +38,7 @@ pub(crate) struct InputLog {
 impl InputLog {
     pub(crate) fn begin(context: &Context, start: &impl Serialize) -> Result<Self> {
         let generation = &context.generation;
-        let cells = context.run.mission.grid_frame().area();
-        let piece = PIECE.max(cells / CELLS_FOR_A_BYTE);
+        let piece = PIECE.max(context.run.mission.grid_frame().area() / CELLS_FOR_A_BYTE);
         let mut log = Self {
             writer: context.bus.slice_writer(&topics::INPUTS, generation.number, piece)?,
             header: InputsHeader { stage: name(generation.stage), ..InputsHeader::default() },

@@ -49,8 +49,7 @@ impl Outputs {
         inputs: Option<InputLog>,
         longest: usize,
     ) -> Result<Self> {
-        let saved = std::mem::take(&mut context.saved);
-        let mut out = Self { inputs, saved, ..Self::default() };
+        let mut out = Self { inputs, saved: std::mem::take(&mut context.saved), ..Self::default() };
         out.open(context, longest, false)?;
         Ok(out)
     }
@@ -76,8 +75,7 @@ impl Outputs {
         for topic in context.wiring.outputs {
             if (topic.spec().rate == Rate::EachFrame) == late {
                 debug_assert_eq!(topic.spec().writer, context.wiring.stage);
-                let number = context.generation.number;
-                let writer = topic.any_writer(&context.bus, number, longest)?;
+                let writer = topic.any_writer(&context.bus, context.generation.number, longest)?;
                 self.writers.push((topic.spec().name, writer));
             }
         }

@@ -25,8 +25,7 @@ pub struct Roster {
 }
 
 pub fn named(entries: &[RosterEntry]) -> impl Iterator<Item = (String, Author)> {
-    let running = entries.iter().filter(|entry| entry.pid != 0);
-    running.map(|entry| {
+    entries.iter().filter(|entry| entry.pid != 0).map(|entry| {
         let author = Author { process: entry.pid, generation: entry.generation };
         (name_str(&entry.stage).to_owned(), author)
     })

@@ -56,8 +56,7 @@ impl Run {
     /// Fails if the file is unreadable or invalid, or from another version with other keys.
     pub fn load(directory: &Path) -> Result<Self, RunError> {
         let file = directory.join(FILE_NAME);
-        let text = read_text(&file).map_err(FileError::of("read", &file))?;
-        Self::parse(&text, &file)
+        Self::parse(&read_text(&file).map_err(FileError::of("read", &file))?, &file)
     }
 
     pub fn parse(text: &str, file: &Path) -> Result<Self, RunError> {

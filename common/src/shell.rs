@@ -535,8 +535,7 @@ impl Heartbeat {
     fn beat_if_due(&mut self, progress: Progress) -> Result<bool> {
         self.sample.turns += 1;
         let age = self.last.elapsed();
-        let with_a_tick = progress.tick != self.tick && age >= self.period / 2;
-        if with_a_tick {
+        if progress.tick != self.tick && age >= self.period / 2 {
             self.beat_quietly(HealthState::Ready, progress)?;
         } else if age >= self.period {
             self.beat(HealthState::Ready, progress)?;

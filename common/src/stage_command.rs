@@ -102,8 +102,7 @@ fn parsed<T: FromStr>(
     option: &str,
     value: &OsString,
 ) -> Result<T, StageCommandError> {
-    let parsed = value.to_str().and_then(|value| value.parse().ok());
-    parsed.ok_or_else(|| StageCommandError {
+    value.to_str().and_then(|value| value.parse().ok()).ok_or_else(|| StageCommandError {
         stage,
         problem: format!("{option} {} has an invalid value", value.display()),
     })

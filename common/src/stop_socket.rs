@@ -168,20 +168,17 @@ impl Operator {
     pub fn answer(&self, patience: Duration) -> io::Result<Option<Answer>> {
         let began = Instant::now();
         loop {
-            let left = patience.saturating_sub(began.elapsed());
-            if !poll::is_readable(&self.socket, left)? {
+            if !poll::is_readable(&self.socket, patience.saturating_sub(began.elapsed()))? {
                 return Ok(None);
             }
             let mut bytes = [0; 2];
             let length = self.socket.recv(&mut bytes)?;
-            match (length, bytes) {
-                (2, [rest, silent_s]) => {
-                    return Ok(Some(Answer::Sees(Rest::from_byte(rest), silent_s)));
-                }
-                (1, [HEARD, _]) => return Ok(Some(Answer::Heard)),
-                (1, [AT_REST, _]) => return Ok(Some(Answer::AtRest)),
-                _ => {}
-            }
+            return Ok(Some(match (length, bytes) {
+                (2, [rest, silent_s]) => Answer::Sees(Rest::from_byte(rest), silent_s),
+                (1, [HEARD, _]) => Answer::Heard,
+                (1, [AT_REST, _]) => Answer::AtRest,
+                _ => continue,
+            }));
         }
     }
 }

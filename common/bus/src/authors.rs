@@ -243,8 +243,7 @@ impl OneStage {
             }
             return Ok(named);
         }
-        let known = [self.process, self.before].contains(&Some(author));
-        if !known {
+        if ![self.process, self.before].contains(&Some(author)) {
             let named = self.writers.process_of(self.stage)?;
             if named.is_some() && named != self.process {
                 self.before = std::mem::replace(&mut self.process, named);

@@ -274,8 +274,7 @@ fn place(places: &[PathBuf], user: u32, robot: &str) -> PathBuf {
     };
     let usable: Vec<_> = places.iter().filter(may_have).collect();
     let has_robot = usable.iter().find(|place| place.join(robot).exists());
-    let found = has_robot.or(usable.first()).copied().or(places.first());
-    found.cloned().unwrap_or_default()
+    has_robot.or(usable.first()).copied().or(places.first()).cloned().unwrap_or_default()
 }
 
 /// Returns the process number in `lock`; a container may use another for that process.

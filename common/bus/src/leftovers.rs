@@ -33,8 +33,7 @@ pub(super) fn remove_unfilled(directory: &Path, prefix: &str, ended: u32) -> io:
         let entry = entry?;
         let name = entry.file_name();
         let name = name.to_string_lossy();
-        let ours = name.starts_with(prefix);
-        let Some(age) = ours.then(|| unfilled_for(&entry)).flatten() else {
+        let Some(age) = name.starts_with(prefix).then(|| unfilled_for(&entry)).flatten() else {
             continue;
         };
         if names(&name, ended) || age >= FILLED {

@@ -155,8 +155,7 @@ impl Bus {
         let join = no_join(&instance.domain);
         let refused = |error: &dyn Debug| join(format!("{error:?}"));
         ownership::check(&instance).map_err(no_join(&instance.domain))?;
-        let other = instance.made_by_another().map_err(no_join(&instance.domain))?;
-        if let Some(runs) = other {
+        if let Some(runs) = instance.made_by_another().map_err(no_join(&instance.domain))? {
             return Err(BusError::OtherVersion { robot: instance.domain.robot.to_string(), runs });
         }
         let file = instance.config();
@@ -275,13 +274,11 @@ impl Bus {
 }
 
 fn nodes_of(node: &BusNode) -> PathBuf {
-    let nodes = node.config().global.node_dir();
-    PathBuf::from(OsStr::from_bytes(nodes.as_bytes()))
+    PathBuf::from(OsStr::from_bytes(node.config().global.node_dir().as_bytes()))
 }
 
 fn services_of(node: &BusNode) -> PathBuf {
-    let services = node.config().global.service_dir();
-    PathBuf::from(OsStr::from_bytes(services.as_bytes()))
+    PathBuf::from(OsStr::from_bytes(node.config().global.service_dir().as_bytes()))
 }
 
 fn backup_of(node: &BusNode) -> PathBuf {

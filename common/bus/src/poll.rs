@@ -37,9 +37,7 @@ pub fn is_writable(descriptor: impl AsFd, timeout: Duration) -> io::Result<bool>
 }
 
 pub fn is_closed(descriptor: impl AsFd) -> io::Result<bool> {
-    let nothing_else = PollFlags::empty();
-    let mut polled = [PollFd::new(&descriptor, nothing_else)];
-    wait(&mut polled, Some(Duration::ZERO))
+    wait(&mut [PollFd::new(&descriptor, PollFlags::empty())], Some(Duration::ZERO))
 }
 
 pub(crate) fn wait(polled: &mut [PollFd<'_>], timeout: Option<Duration>) -> io::Result<bool> {
@@ -47,8 +45,7 @@ pub(crate) fn wait(polled: &mut [PollFd<'_>], timeout: Option<Duration>) -> io::
     loop {
         let left = timeout.map(|timeout| timeout.saturating_sub(began.elapsed()));
         // A timeout beyond the system's range means none.
-        let left = left.and_then(|left| Timespec::try_from(left).ok());
-        match poll(polled, left.as_ref()) {
+        match poll(polled, left.and_then(|left| Timespec::try_from(left).ok()).as_ref()) {
             Err(Errno::INTR) => {}
             came => return Ok(came? > 0),
         }

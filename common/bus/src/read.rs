@@ -80,8 +80,7 @@ impl Bus {
     fn leave_places(&self, spec: &Spec, places: usize, taken: usize) -> Result {
         assert!(Limits::KEPT_FREE < places);
         if !self.is_stage && taken + Limits::KEPT_FREE >= places {
-            let topic = spec.name;
-            return Err(BusError::NoPlace { topic, places });
+            return Err(BusError::NoPlace { topic: spec.name, places });
         }
         Ok(())
     }

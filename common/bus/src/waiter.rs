@@ -26,8 +26,7 @@ impl Waiter {
 
     /// The caller reads from `descriptor`.
     pub fn on_readable(&mut self, descriptor: impl AsFd) -> Result {
-        let own = descriptor.as_fd().try_clone_to_owned().map_err(BusError::Wait)?;
-        self.descriptors.push(own);
+        self.descriptors.push(descriptor.as_fd().try_clone_to_owned().map_err(BusError::Wait)?);
         Ok(())
     }
 

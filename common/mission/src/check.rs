@@ -280,8 +280,7 @@ const MOST_DRIVEN_CELLS: u32 = 2048;
 fn perimeter(mission: &Mission) -> Result {
     let perimeter = &mission.perimeter;
     within("perimeter.width_m", perimeter.width_m, 0.5..=1000.0, "m")?;
-    let frame = mission.grid_frame();
-    let cells = frame.cells;
+    let cells = mission.grid_frame().cells;
     refuse_if(
         !(MIN_CELLS..=MOST_DRIVEN_CELLS).contains(&cells),
         "perimeter.cells",

@@ -162,14 +162,12 @@ impl Shapes {
     }
 
     pub fn edges(&self) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
-        let walls = self.walls.iter().flat_map(Wall::edges);
-        let boxes = self.boxes.iter().flat_map(Box2::edges);
-        walls.chain(boxes)
+        self.walls.iter().flat_map(Wall::edges).chain(self.boxes.iter().flat_map(Box2::edges))
     }
 
     pub fn pieces(&self) -> impl Iterator<Item = Piece<'_>> + '_ {
-        let edges = self.walls.iter().flat_map(Wall::edges);
-        let walls = edges.map(|(from, to)| Piece::Edge(from, to));
+        let walls = self.walls.iter().flat_map(Wall::edges);
+        let walls = walls.map(|(from, to)| Piece::Edge(from, to));
         self.drums.iter().map(Piece::Drum).chain(walls).chain(self.boxes.iter().map(Piece::Box))
     }
 

@@ -419,8 +419,7 @@ impl Mission {
     }
 
     pub fn hazards_topic(&self) -> Option<String> {
-        let preset = &self.robot.preset().ros2;
-        self.robot.ros2.hazards.as_ref().or(preset.hazards.as_ref()).cloned()
+        self.robot.ros2.hazards.clone().or_else(|| self.robot.preset().ros2.hazards.clone())
     }
 
     pub fn lasers(&self) -> Vec<(usize, Sensor)> {
@@ -444,10 +443,8 @@ impl Mission {
 
     /// Returns the lasers with a wire of their own.
     pub fn rplidars(&self) -> Vec<(usize, Sensor, Rplidar)> {
-        let with_product = |(row, sensor)| {
-            let product = self.rplidar(row, &sensor)?;
-            Some((row, sensor, product))
-        };
+        let with_product =
+            |(row, sensor)| self.rplidar(row, &sensor).map(|product| (row, sensor, product));
         self.lasers().into_iter().filter_map(with_product).collect()
     }
 

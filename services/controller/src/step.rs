@@ -137,8 +137,7 @@ impl Controller {
     fn has_arrived(&mut self, guidance: &GuidanceSample, distance: f64) -> bool {
         let number = guidance.target_number;
         let beside = guidance.status() == GuidanceStatus::AtTarget && distance <= MOST_OFF_TARGET_M;
-        let tolerance = self.mission.arrival_tolerance_m;
-        let is_there = self.reached.is(number, distance, tolerance, beside);
+        let is_there = self.reached.is(number, distance, self.mission.arrival_tolerance_m, beside);
         let faces = guidance.target.heading().is_none_or(|heading| {
             wrap_angle(heading - guidance.heading_rad).abs() <= FACES_WITHIN_RAD
         });

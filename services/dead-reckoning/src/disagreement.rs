@@ -193,8 +193,7 @@ impl Disagreement {
         let turn = turns.filter(|Two { a: [factor, deviation], rest, .. }| {
             is_off(*factor, *deviation, 1.0 - rest / self.turn.yy)
         });
-        let way = factor(&self.way, LEAST_WAY).map(Cause::Way);
-        way.or(turn.map(|turns| Cause::Turn(turns.a[0])))
+        factor(&self.way, LEAST_WAY).map(Cause::Way).or(turn.map(|turns| Cause::Turn(turns.a[0])))
     }
 
     fn late(&self) -> Option<f64> {

@@ -376,8 +376,7 @@ impl History {
             let Some(oldest) = self.ticks.pop_front() else { break };
             self.base.advance(motions, &oldest);
             while let Some((_, fix)) = self.fixes.pop_front_if(|(at, _)| *at <= oldest.time) {
-                let there = self.base.at(motions, &oldest, &fix);
-                self.base.take(&fix, there);
+                self.base.take(&fix, self.base.at(motions, &oldest, &fix));
             }
         }
         assert!(self.ticks.len() <= MOST_TICKS);

@@ -420,15 +420,13 @@ impl DeadReckoning {
         Some(match self.body.drive() {
             Drive::Differential(drive) => {
                 let [left_scale, right_scale] = self.wheel_scales;
-                let right = right * per_count * right_scale;
-                drive.twist([wheel * left_scale, right])
+                drive.twist([wheel * left_scale, right * per_count * right_scale])
             }
             Drive::Ackermann(drive) => {
                 // The mean angle stands for the steering in between.
                 let middle = f64::from(counts_between(0, last.right)) + right / 2.0;
                 let angle = self.body.steering.map(|steering| steering.angle(middle));
-                let wheel = wheel * self.distance_scale;
-                drive.twist([wheel, angle.unwrap_or_default()])
+                drive.twist([wheel * self.distance_scale, angle.unwrap_or_default()])
             }
         })
     }

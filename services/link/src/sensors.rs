@@ -66,8 +66,7 @@ impl Sensors {
                 readings.push(laser.take_scan((scan, own_wire), self.turned, &self.body));
             }
         }
-        let rows = self.newest.len();
-        readings.retain(|reading| usize::from(reading.sensor) < rows);
+        readings.retain(|reading| usize::from(reading.sensor) < self.newest.len());
         for reading in &readings {
             self.newest[usize::from(reading.sensor)] = *reading;
         }

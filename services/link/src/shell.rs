@@ -132,8 +132,7 @@ impl Process for Shell {
                 Ok(Transport::open(&address.unwrap_or(context.run.address.clone()), sensor.line)?)
             })
             .collect::<Result<Vec<_>>>()?;
-        let all = std::iter::once(&transport).chain(&wires);
-        for wire in all.filter_map(Transport::descriptor) {
+        for wire in std::iter::once(&transport).chain(&wires).filter_map(Transport::descriptor) {
             context.waiter.on_readable(wire)?;
         }
         if let Some(socket) = &stop_socket {
@@ -434,8 +433,10 @@ impl Shell {
                     self.state()?;
                 }
                 Effect::Restarted => {
-                    let restarts = self.runner.stage.link.restarts();
-                    tracing::warn!(restarts, "the robot has restarted");
+                    tracing::warn!(
+                        restarts = self.runner.stage.link.restarts(),
+                        "the robot has restarted"
+                    );
                 }
                 Effect::CountsElsewhere => tracing::warn!(
                     "the encoder counts or the odometry jumped farther than the wheels can turn, and continue from there; the pose stays unchanged"

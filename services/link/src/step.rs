@@ -237,9 +237,8 @@ impl Link {
     }
 
     pub fn wire_tally(&self) -> WireTally {
-        let base = self.base.tally();
         let dropped = self.drivers.iter().map(|driver| driver.tally().bytes_dropped);
-        base.with_dropped(dropped.sum())
+        self.base.tally().with_dropped(dropped.sum())
     }
 
     pub const fn restarts(&self) -> u32 {
@@ -496,8 +495,7 @@ impl Link {
         };
         let left = self.limit.saturating_sub(now.since(repeat.stamp));
         // The next command follows an open tick soon.
-        let superseded = self.open.is_some();
-        if superseded || left < LEAST_LEFT || self.decide().stops() {
+        if self.open.is_some() || left < LEAST_LEFT || self.decide().stops() {
             return;
         }
         self.tell(repeat.counts, left);

@@ -70,8 +70,7 @@ fn clear_beam(origin: DVec2, axis: DVec2, clear_m: f64) -> ClearBeam {
 
 fn append(readings: &mut Vec<Dated>, most: usize, newest: Dated) {
     assert!(most > 0);
-    let oldest_m = newest.rolled_m - CLEAR_FOR_M;
-    readings.retain(|dated| dated.rolled_m > oldest_m);
+    readings.retain(|dated| dated.rolled_m > newest.rolled_m - CLEAR_FOR_M);
     if readings.len() >= most {
         readings.remove(0);
     }

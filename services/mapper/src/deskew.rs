@@ -99,10 +99,8 @@ impl Poses {
         let beams = match sweep.beam_ns {
             0 => beams,
             _ => {
-                let seen_from = |beam| {
-                    let robot = robot_at(sweep.beam_time_ns(beam, beams.len()))?;
-                    rows.scan(row, robot, &beams)
-                };
+                let seen_from =
+                    |beam| rows.scan(row, robot_at(sweep.beam_time_ns(beam, beams.len()))?, &beams);
                 at_once(&rows.scan(row, robot, &beams)?, seen_from)?
             }
         };

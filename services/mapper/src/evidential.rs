@@ -104,8 +104,7 @@ impl Evidential {
     /// Completes a restored map; fails for another mission's.
     pub(crate) fn complete(&self, map: &mut EvidenceMap) -> Result<(), ForeignState> {
         let lattice = self.ground.lattice;
-        let fits = map.others.len() == self.others() && map.grids().all(|grid| grid.fits(&lattice));
-        if !fits {
+        if map.others.len() != self.others() || !map.grids().all(|grid| grid.fits(&lattice)) {
             return Err(ForeignState);
         }
         map.within_reach = vec![0; self.grid.area()];

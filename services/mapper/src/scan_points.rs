@@ -38,8 +38,7 @@ pub(crate) fn points(fan: &Fan<'_>) -> Vec<Point> {
         let beside = ((half_m / spacing_m.max(1e-6)).ceil() as usize).clamp(1, 40);
         let around = &ends[beam.saturating_sub(beside)..(beam + beside + 1).min(ends.len())];
         let near = around.iter().flatten().filter(|other| other.distance(at) <= 2.0 * half_m);
-        let line = line_through(near, half_m);
-        let (at, normal) = line.map_or((at, None), |(middle, normal)| {
+        let (at, normal) = line_through(near, half_m).map_or((at, None), |(middle, normal)| {
             (middle, Some(if normal.dot(fan.origin - middle) < 0.0 { -normal } else { normal }))
         });
         Some(Point { at, normal, deviation_m, vote: 0.0 })

@@ -147,8 +147,7 @@ impl Process for Shell {
             tracing::warn!(epoch, "the sensed belief is reset");
         }
         // The windows of late ticks, all at once, push each other out of the planner's queue.
-        let overflows = ticks >= GRID.spec().limits.buffer;
-        if self.runner.out.has_new_reader(&GRID)? || overflows {
+        if self.runner.out.has_new_reader(&GRID)? || ticks >= GRID.spec().limits.buffer {
             self.publish_again()?;
         }
         Ok(self.runner.out.at)

@@ -142,8 +142,8 @@ impl Ros2 {
             Content::Command => {
                 let (&number, payload) =
                     payload.split_first_chunk().ok_or("the command lacks its writer")?;
-                let moves = read_moves(payload, self.stamped)?;
-                heard.commander = Some(Commander { number, moves });
+                heard.commander =
+                    Some(Commander { number, moves: read_moves(payload, self.stamped)? });
             }
         }
         Ok(())

@@ -78,8 +78,7 @@ impl Rplidar {
         let ended: Vec<_> = beams.iter().map(|beam| beam.is_finite()).collect();
         let count = ended.len();
         for (beam, range) in beams.iter_mut().enumerate().filter(|(_, range)| range.is_infinite()) {
-            let beside = [beam + count - 1, beam + 1];
-            if beside.into_iter().any(|beam| ended[beam % count]) {
+            if [beam + count - 1, beam + 1].into_iter().any(|beam| ended[beam % count]) {
                 *range = f32::NAN;
             }
         }

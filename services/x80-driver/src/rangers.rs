@@ -38,8 +38,7 @@ impl Rangers {
     fn readings(&self, kind: SensorKind, channels: &[RangeReading]) -> Vec<RangeReading> {
         let rows = (0..).zip(&self.table).filter(|(_, row)| row.kind == kind);
         let read = |(sensor, row): (u8, &Sensor)| {
-            let reading = *channels.get(usize::from(row.channel))?;
-            Some(RangeReading { sensor, ..reading })
+            Some(RangeReading { sensor, ..*channels.get(usize::from(row.channel))? })
         };
         rows.filter_map(read).collect()
     }

@@ -120,8 +120,7 @@ impl Pass for Reader<'_> {
 
     fn number<const N: usize>(&mut self, bytes: &mut [u8; N]) -> Result {
         let start = self.at.next_multiple_of(N);
-        let found = self.bytes.get(start..).and_then(<[u8]>::first_chunk);
-        *bytes = *found.ok_or(Malformed::Short)?;
+        *bytes = *self.bytes.get(start..).and_then(<[u8]>::first_chunk).ok_or(Malformed::Short)?;
         self.at = start + N;
         if self.is_big {
             bytes.reverse();

@@ -111,8 +111,7 @@ impl Decode<'_, Payload> for Raw {
         bytes: &[u8],
         as_: RepresentationIdentifier,
     ) -> Result<Payload, Infallible> {
-        let bytes = bytes.get(..LONGEST).unwrap_or(bytes);
-        Ok([&as_.to_bytes()[..], &[0, 0], bytes].concat())
+        Ok([&as_.to_bytes()[..], &[0, 0], bytes.get(..LONGEST).unwrap_or(bytes)].concat())
     }
 }
 

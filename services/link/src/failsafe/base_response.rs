@@ -107,8 +107,7 @@ impl Monitor for BaseResponse {
                 }
             }
             Observation::Command(command) => {
-                let follows = command.pose_ns >= self.told_from.0;
-                self.is_followed |= self.brakes_by_response && follows;
+                self.is_followed |= self.brakes_by_response && command.pose_ns >= self.told_from.0;
             }
             _ => {}
         }

@@ -177,8 +177,7 @@ impl Hearing {
         let of = |row: u8| readings.iter().find(|reading| reading.sensor == row);
         for (row, range_m) in [left, right].into_iter().zip(&mut self.memory.beside_m) {
             if let Some(reading) = of(row) {
-                let is_range = reading.status() == RangeStatus::Measured;
-                *range_m = is_range.then_some(reading.range_m);
+                *range_m = (reading.status() == RangeStatus::Measured).then_some(reading.range_m);
             }
         }
         if self.surface_m().is_none() {

@@ -89,8 +89,7 @@ pub(super) fn rolled(robot: Pose2, [from, to]: [Pose2; 2], share: f64) -> Pose2 
 
 /// Returns the motion between two poses, metres, with a turn's metres per radian.
 pub(super) fn motion_m([from, to]: [Pose2; 2], m_per_rad: f64) -> f64 {
-    let turned_m = m_per_rad * (to.heading - from.heading).abs();
-    to.position.distance(from.position) + turned_m
+    to.position.distance(from.position) + m_per_rad * (to.heading - from.heading).abs()
 }
 
 /// Poses by the wheels.

@@ -211,8 +211,7 @@ impl Odometry {
         let limit = self.limit;
         let lapsed = |then: &MissionTime| now.since(*then) > limit;
         if let Some(then) = self.commanded.filter(lapsed) {
-            let lapse = then.0.saturating_add(limit.as_nanos() as u64);
-            self.ask([0.0; 2], MissionTime(lapse));
+            self.ask([0.0; 2], MissionTime(then.0.saturating_add(limit.as_nanos() as u64)));
         }
         if self.commanded.is_none_or(|then| lapsed(&then)) {
             self.restart_evidence(now);
@@ -276,8 +275,7 @@ impl Odometry {
         let gap = now.since(then);
         let turned = counts.since(before);
         self.fit.turned((gap <= self.longest_gap).then_some(turned), now);
-        let lapsed = |at| now.since(at) > self.limit;
-        if gap > self.longest_gap || self.commanded.is_none_or(lapsed) {
+        if gap > self.longest_gap || self.commanded.is_none_or(|at| now.since(at) > self.limit) {
             // Commands since the last frame may be lost or expired.
             self.restart_evidence(now);
             return;

@@ -250,8 +250,7 @@ impl Range {
     }
 
     fn tell(&mut self) {
-        let rolls = self.motion.rolls();
-        self.told = rolls.map(|(share, since_s)| {
+        self.told = self.motion.rolls().map(|(share, since_s)| {
             let from = self.told.unwrap_or_else(|| self.poses.at(since_s));
             self.untold[0] += (share - 1.0) * from.position.distance(self.pose.position);
             self.untold[1] += (share - 1.0) * (self.pose.heading - from.heading);
@@ -335,8 +334,7 @@ impl Monitor for Range {
         if self.judged(sure).is_some() {
             return Condition::Holds;
         }
-        let conditions = self.rows.iter().map(|row| row.condition(sure, now));
-        conditions.min().unwrap_or(false.into())
+        self.rows.iter().map(|row| row.condition(sure, now)).min().unwrap_or(false.into())
     }
 
     fn doubt(&self, doubts: &mut DoubtsSample) {

@@ -94,8 +94,7 @@ impl RangeMotion {
     pub(super) fn of(mission: &Mission) -> Self {
         let is_single = |sensor: &Sensor| sensor.used && sensor.kind != SensorKind::Scan;
         let table = (0..).zip(mission.sensor_table());
-        let sensors = table.filter(|(_, sensor)| is_single(sensor)).collect();
-        Self::with(sensors)
+        Self::with(table.filter(|(_, sensor)| is_single(sensor)).collect())
     }
 
     fn with(sensors: BTreeMap<u8, Sensor>) -> Self {

@@ -227,8 +227,7 @@ impl ResponseFit {
             return None;
         }
         let fits = self.weighed(|dead_time_s, limits, courses| {
-            let motions = self.motions(dead_time_s, limits, courses, *first_s);
-            let (unlike, all, factor) = fit(motions);
+            let (unlike, all, factor) = fit(self.motions(dead_time_s, limits, courses, *first_s));
             // Wheels that reach less speed reach it sooner.
             let most = limits.most.map(|most| most * factor);
             let response = self.axle.response(dead_time_s, Limits { most, ..limits });

@@ -31,8 +31,7 @@ impl Stop {
 
     /// None if unbounded.
     pub fn by(cause: Cause, mission: &Mission) -> Option<Self> {
-        let known_s = rule(cause)?.known_within_s?(mission);
-        Some(Self::known_after(known_s, mission))
+        Some(Self::known_after(rule(cause)?.known_within_s?(mission), mission))
     }
 }
 

@@ -139,8 +139,7 @@ impl StopMonitor {
             self.tried = None;
             return false;
         }
-        let recently = |tried| now.since(tried) < NEXT_METHOD_AFTER;
-        if self.tried.is_some_and(recently) {
+        if self.tried.is_some_and(|tried| now.since(tried) < NEXT_METHOD_AFTER) {
             return false;
         }
         self.tried = Some(now);

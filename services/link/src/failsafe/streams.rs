@@ -69,8 +69,7 @@ impl Streams {
     }
 
     pub fn motor_frames(&self, now_ns: u64) -> Motor {
-        let since = self.motor_ns.max(self.found_ns);
-        if self.silence.is_over(since, now_ns) {
+        if self.silence.is_over(self.motor_ns.max(self.found_ns), now_ns) {
             return Motor::Silent;
         }
         let mut sorted = self.intervals;

@@ -24,8 +24,7 @@ impl Link {
         let before = std::mem::replace(&mut self.decision, now);
         if now.cause == Cause::AnotherCommander {
             // The wheels obey the other commander.
-            let now = self.moment();
-            self.failsafe.odometry.observe(&Observation::Resumed, now);
+            self.failsafe.odometry.observe(&Observation::Resumed, self.moment());
         }
         if now.stops() {
             self.repeat = None;

@@ -109,8 +109,7 @@ impl Link {
             self.observe(Observation::Touched(&heard.touched));
         }
         if heard.anything && self.failsafe.presence.heard(self.now_ns) {
-            let again = self.losses() > 0;
-            self.observe(Observation::Found { again });
+            self.observe(Observation::Found { again: self.losses() > 0 });
             self.effects.push(Effect::Connected(true));
             self.send(self.base.greeting());
             // The robot may still obey an earlier link's command.
@@ -144,8 +143,7 @@ impl Link {
         let counts = cyclic(motion);
         self.observe(Observation::Currents(motion.currents));
         let speeds = [wheels.left_counts_per_s, wheels.right_counts_per_s];
-        let was_away = !self.connected();
-        let are = self.restart.step(counts, speeds, was_away, self.now);
+        let are = self.restart.step(counts, speeds, !self.connected(), self.now);
         self.observe(Observation::Motor(counts, are));
         self.tell_response();
         are
@@ -190,8 +188,7 @@ impl Link {
 
     fn take_power(&mut self, heard: &Heard) {
         if let Some(power) = heard.power {
-            let volts = [power.board_v, power.motor_v, power.servo_v];
-            self.observe(Observation::Batteries(volts));
+            self.observe(Observation::Batteries([power.board_v, power.motor_v, power.servo_v]));
             let battery = &mut self.failsafe.battery;
             let [board_low, motor_low, servo_low] = battery.low().map(u8::from);
             self.effects.push(Effect::Power(PowerSample {
