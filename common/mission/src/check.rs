@@ -54,18 +54,19 @@ impl Mission {
             let line = error.span().map_or(1, |span| line_of(text, span.start));
             unreadable(origin, line, &error.message().trim().replace('\n', " "))
         };
+        let refused = |offset: usize, key, problem, remedy| MissionError::Value {
+            file: origin.to_path_buf(),
+            line: line_of(text, offset),
+            key,
+            problem,
+            remedy,
+        };
         let tree = DeTable::parse(text).map_err(|error| syntax(&error))?;
         let mut mission: Self = toml::from_str(text).map_err(|error| syntax(&error))?;
         if let Ok(read) = toml::Value::try_from(&mission)
             && let Some((start, key, problem)) = dropped("", tree.get_ref(), &read)
         {
-            return Err(MissionError::Value {
-                file: origin.to_path_buf(),
-                line: line_of(text, start),
-                key,
-                problem,
-                remedy: "remove the others".to_owned(),
-            });
+            return Err(refused(start, key, problem, "remove the others".to_owned()));
         }
         if !tree.get_ref().contains_key("target") {
             mission.target = match mission.targets.first() {
@@ -86,12 +87,8 @@ impl Mission {
         }
         mission.remarks = remarks(text, origin, tree.get_ref(), &mission);
         let checked = Checker::default().run(&mission);
-        checked.map_err(|Objection { key, problem, remedy }| MissionError::Value {
-            file: origin.to_path_buf(),
-            line: line_of(text, span_of(tree.get_ref(), key)),
-            key: key.to_owned(),
-            problem,
-            remedy,
+        checked.map_err(|Objection { key, problem, remedy }| {
+            refused(span_of(tree.get_ref(), key), key.to_owned(), problem, remedy)
         })?;
         assert!(mission.target.is_finite() && mission.contains(mission.start.at));
         assert!(mission.speed_m_s() > 0.0 && mission.turn_rad_s() > 0.0);

@@ -48,15 +48,11 @@ pub(super) struct Queue {
     samples: RefCell<VecDeque<Rc<Sample>>>,
 }
 
-#[derive(Debug, Default)]
-pub(super) struct Writer {
-    last: RefCell<Option<Rc<Sample>>>,
-}
+/// Last sample.
+pub(super) type Writer = RefCell<Option<Rc<Sample>>>;
 
-#[derive(Debug, Default)]
-pub(crate) struct Listener {
-    woken: Cell<bool>,
-}
+/// Whether notified.
+pub(crate) type Listener = Cell<bool>;
 
 /// Bytes aligned for every payload.
 #[derive(Debug)]
@@ -113,7 +109,7 @@ impl Topic {
         self.readers.borrow_mut().push((self.opened.get(), Rc::downgrade(&queue)));
         self.writers.borrow_mut().retain(|writer| writer.strong_count() > 0);
         for writer in self.writers.borrow().iter().filter_map(Weak::upgrade) {
-            queue.samples.borrow_mut().extend(writer.last.borrow().clone());
+            queue.samples.borrow_mut().extend(writer.borrow().clone());
         }
         queue
     }
@@ -133,7 +129,7 @@ impl Topic {
     pub(super) fn wake(&self) {
         self.listeners.borrow_mut().retain(|listener| {
             let listener = listener.upgrade();
-            listener.inspect(|listener| listener.woken.set(true)).is_some()
+            listener.inspect(|listener| listener.set(true)).is_some()
         });
     }
 
@@ -175,7 +171,7 @@ impl Topic {
             assert!(samples.len() <= queue.buffer);
             true
         });
-        writer.last.replace(Some(sample));
+        writer.replace(Some(sample));
         true
     }
 }
@@ -183,17 +179,6 @@ impl Topic {
 impl Queue {
     pub(super) fn receive(&self) -> Option<Rc<Sample>> {
         self.samples.borrow_mut().pop_front()
-    }
-}
-
-impl Listener {
-    pub(super) fn is_woken(&self) -> bool {
-        self.woken.get()
-    }
-
-    /// Returns whether there was one.
-    pub(super) fn drain(&self) -> bool {
-        self.woken.replace(false)
     }
 }
 

@@ -490,7 +490,7 @@ impl Listener {
     /// Returns whether there is a notification; always false in shared memory, where a descriptor
     /// shows it.
     pub(crate) fn is_woken(&self) -> bool {
-        matches!(self, Self::Memory(listener) if listener.is_woken())
+        matches!(self, Self::Memory(listener) if listener.get())
     }
 
     /// Returns whether there were any.
@@ -500,7 +500,7 @@ impl Listener {
                 let events = listener.try_wait(|_| {});
                 events.map(|events| events > 0).map_err(refused("listen to", "a topic"))
             }
-            Self::Memory(listener) => Ok(listener.drain()),
+            Self::Memory(listener) => Ok(listener.replace(false)),
         }
     }
 
