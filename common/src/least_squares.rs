@@ -14,9 +14,9 @@ impl Line {
     /// `left` scales the previous sums.
     pub fn add(&mut self, left: f64, x: f64, y: f64) {
         assert!((0.0..=1.0).contains(&left));
-        for (sum, term) in [(&mut self.xx, x * x), (&mut self.xy, x * y), (&mut self.yy, y * y)] {
-            *sum = *sum * left + term;
-        }
+        self.xx = self.xx * left + x * x;
+        self.xy = self.xy * left + x * y;
+        self.yy = self.yy * left + y * y;
     }
 
     /// Returns the factor and its standard deviation for this number of pairs.

@@ -66,7 +66,8 @@ impl Outputs {
         self.replayed.as_ref().is_none_or(|replayed| replayed.has_field)
     }
 
-    pub(crate) fn open_late(&mut self, context: &mut Context) -> Result {
+    /// Call it after the first ready heartbeat.
+    pub fn open_late(&mut self, context: &mut Context) -> Result {
         self.open(context, 0, true)
     }
 

@@ -95,11 +95,6 @@ impl<S: Stage> Runner<S> {
         Ok(Self { stage, out })
     }
 
-    /// Call it after the first ready heartbeat.
-    pub fn open_late(&mut self, context: &mut Context) -> Result {
-        self.out.open_late(context)
-    }
-
     pub fn take_entry(&mut self, entry: S::Entry<'_>) -> Result<S::Outcome> {
         self.out.note(&entry)?;
         self.stage.take_entry(entry, &mut self.out)

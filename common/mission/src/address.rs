@@ -1,6 +1,7 @@
 use std::{
-    fmt,
+    fmt, io,
     net::{SocketAddr, ToSocketAddrs},
+    num::NonZeroU16,
     path::PathBuf,
     str::FromStr,
 };
@@ -38,7 +39,7 @@ pub enum AddressError {
     #[error(
         "cannot resolve the host of {address:?}: {source}; give its IP address, or a name that this machine resolves"
     )]
-    Host { address: String, source: std::io::Error },
+    Host { address: String, source: io::Error },
 }
 
 impl<Host: fmt::Display> fmt::Display for Address<Host> {
@@ -75,14 +76,13 @@ impl FromStr for Address<String> {
             };
         }
         let (host, port) = rest.rsplit_once(':').ok_or_else(|| refused("has no port"))?;
-        if port.parse::<u16>().is_ok_and(|port| port > 0) {
-            let bracketed = host.starts_with('[') && host.ends_with(']');
-            let plain = |c: char| !c.is_whitespace() && c != '/' && (c != ':' || bracketed);
-            if host.is_empty() || !host.chars().all(plain) {
-                return Err(refused("has no valid host"));
-            }
-        } else {
+        if port.parse::<NonZeroU16>().is_err() {
             return Err(refused("has no port from 1 to 65535"));
+        }
+        let bracketed = host.starts_with('[') && host.ends_with(']');
+        let plain = |c: char| !c.is_whitespace() && c != '/' && (c != ':' || bracketed);
+        if host.is_empty() || !host.chars().all(plain) {
+            return Err(refused("has no valid host"));
         }
         match over {
             "udp" => Ok(Self::Udp(rest.to_owned())),
@@ -99,18 +99,16 @@ impl Address<String> {
             let unknown = |source| AddressError::Host { address: self.to_string(), source };
             let mut found = host.to_socket_addrs().map_err(unknown)?;
             found.next().ok_or_else(|| {
-                unknown(std::io::Error::new(
-                    std::io::ErrorKind::NotFound,
-                    "the name has no IP address",
-                ))
+                unknown(io::Error::new(io::ErrorKind::NotFound, "the name has no IP address"))
             })
         };
         Ok(match self {
             Self::Udp(host) => Address::Udp(number(host)?),
             Self::Tcp(host) => Address::Tcp(number(host)?),
             Self::Serial(path) => Address::Serial(path.clone()),
-            Self::Ros2(Some(domain)) => Address::Ros2(Some(*domain)),
-            Self::Ros2(None) => Address::Ros2(Some(domain_of_environment()?)),
+            Self::Ros2(domain) => {
+                Address::Ros2(Some(domain.map_or_else(domain_of_environment, Ok)?))
+            }
         })
     }
 }

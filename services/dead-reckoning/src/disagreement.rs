@@ -146,14 +146,10 @@ impl Disagreement {
         }
         self.pairs = self.pairs * REMEMBERED + 1.0;
         let went = by_wheels.position;
-        for (line, x, y) in [
-            (&mut self.turn, by_wheels.heading, turn),
-            (&mut self.way, went.x, way.x),
-            (&mut self.aside, went.x, way.y - went.y),
-            (&mut self.bend, went.x, turn),
-        ] {
-            line.add(REMEMBERED, x, y);
-        }
+        self.turn.add(REMEMBERED, by_wheels.heading, turn);
+        self.way.add(REMEMBERED, went.x, way.x);
+        self.aside.add(REMEMBERED, went.x, way.y - went.y);
+        self.bend.add(REMEMBERED, went.x, turn);
         self.turn_way = self.turn_way * REMEMBERED + by_wheels.heading * went.x;
         if self.is_named() || self.pairs < LEAST_PAIRS {
             return None;

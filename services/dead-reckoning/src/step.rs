@@ -461,9 +461,9 @@ impl DeadReckoning {
             place += DOUBT[0];
             heading_doubt += DOUBT[1];
         }
-        for (entry, more) in [(0, place), (3, place), (5, heading_doubt)] {
-            covariance[entry] += more;
-        }
+        covariance[0] += place;
+        covariance[3] += place;
+        covariance[5] += heading_doubt;
         let turned = heading - odometry.heading;
         let origin = position - DVec2::from_angle(turned).rotate(odometry.position);
         PoseSample {

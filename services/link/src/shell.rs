@@ -227,7 +227,7 @@ impl Process for Shell {
 
     fn after_ready(&mut self, context: &mut Context) -> Result {
         self.has_telemetry = true;
-        self.runner.open_late(context)
+        self.runner.out.open_late(context)
     }
 
     fn trouble(&mut self) -> Option<Refusal> {

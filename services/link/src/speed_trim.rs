@@ -78,10 +78,9 @@ impl SpeedTrim {
             let told = self.told.map(|told| told[wheel]);
             let newest = told[STEADY - 1];
             let along = told.map(|counts_s| counts_s * newest.signum());
-            let least = along.into_iter().fold(f64::INFINITY, f64::min);
+            let least = along.into_iter().fold(speed * newest.signum(), f64::min);
             let greatest = along.into_iter().fold(0.0, f64::max);
-            let reached = speed * newest.signum();
-            if least.min(reached) < LEAST_COUNTS_S || least.min(reached) < AGREE * greatest {
+            if least < LEAST_COUNTS_S.max(AGREE * greatest) {
                 continue;
             }
             let rolled = turned[wheel] / gap_s;

@@ -231,7 +231,7 @@ fn fill(side: u32, corners: &[DVec2], mut span: impl FnMut(u32, Range<u32>)) {
     debug_assert!(corners.iter().all(|corner| corner.is_finite()));
     let last = f64::from(side) - 1.0;
     let mut crossings = vec![Vec::new(); side as usize];
-    let before = corners.iter().skip(corners.len().saturating_sub(1)).chain(corners);
+    let before = corners.last().into_iter().chain(corners);
     for (from, to) in before.zip(corners) {
         let (least, greatest) = (from.y.min(to.y), from.y.max(to.y));
         let slope = (to.x - from.x) / (to.y - from.y);

@@ -250,7 +250,7 @@ impl Track {
             seen_s: thing.at_s,
             was_whole: thing.is_whole(),
             places: 1,
-            came: f64::from(u8::from(thing.came)),
+            came: f64::from(thing.came),
             radius_m: thing.half_width_m,
             is_mover: false,
             middle: DVec2::ZERO,
@@ -309,8 +309,7 @@ impl Track {
         self.seen_s = thing.at_s;
         assert!(!self.variance.iter().any(|variance| *variance < -1e-9));
         self.places += 1;
-        self.came += NEWEST.max(1.0 / f64::from(self.places))
-            * (f64::from(u8::from(thing.came)) - self.came);
+        self.came += NEWEST.max(1.0 / f64::from(self.places)) * (f64::from(thing.came) - self.came);
         assert!((0.0..=1.0).contains(&self.came));
         self.radius_m = thing.half_width_m.max(RADIUS_LEFT * self.radius_m);
         let deviation_m_s = self.variance[2].sqrt();

@@ -195,9 +195,9 @@ impl Participant {
     }
 
     fn topic(&self, topic: &Topic, policies: &QosPolicies) -> io::Result<rustdds::Topic> {
-        let (name, type_name) = (topic.dds_name(), topic.type_name.clone());
-        let topic = self.inner.create_topic(name, type_name, policies, TopicKind::NoKey);
-        topic.map_err(io::Error::other)
+        self.inner
+            .create_topic(topic.dds_name(), topic.type_name.clone(), policies, TopicKind::NoKey)
+            .map_err(io::Error::other)
     }
 
     /// Resets the descriptor. Take from the readers afterwards: it signals only messages that come
