@@ -111,7 +111,8 @@ pub(crate) fn encode_after<T: Serialize>(
     capacity: usize,
     path: &Path,
 ) -> Result<Vec<u8>, CheckpointError> {
-    let (start, file) = (header.len(), || path.to_path_buf());
+    let start = header.len();
+    let file = || path.to_path_buf();
     let bytes = postcard::to_extend(state, header)
         .map_err(|source| CheckpointError::Encode { file: file(), source })?;
     let length = bytes.len() - start;

@@ -173,8 +173,13 @@ impl ComplaintSample {
     pub const LASTS: Duration = Duration::from_secs(10);
 
     pub fn of(stage: &str, Refusal { input, what, remedy }: &Refusal) -> Self {
-        let (stage, input) = (name(stage), words(input));
-        Self { stage, input, what: words(what), remedy: words(remedy), ..Self::default() }
+        Self {
+            stage: name(stage),
+            input: words(input),
+            what: words(what),
+            remedy: words(remedy),
+            ..Self::default()
+        }
     }
 
     pub fn refusal(&self) -> Refusal {
@@ -277,7 +282,8 @@ pub fn range_reading(row: usize, sensor: &Sensor, range: Option<f64>) -> RangeRe
 /// Converts a beam for the topic `scan`: infinite if missing or beyond reach, NaN if below the
 /// least range or beyond twice the reach.
 pub fn beam(sensor: &Sensor, range: Option<f32>) -> f32 {
-    let (least_m, reach_m) = (sensor.model.product().least_m as f32, sensor.reach_m as f32);
+    let least_m = sensor.model.product().least_m as f32;
+    let reach_m = sensor.reach_m as f32;
     match range {
         Some(range) if !(f64::from(least_m)..=most_m(sensor)).contains(&range.into()) => f32::NAN,
         Some(range) if range <= reach_m => range,

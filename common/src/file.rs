@@ -52,7 +52,8 @@ impl Store {
     pub(crate) fn read(&self, at: u64, most: u64) -> io::Result<Vec<u8>> {
         match self {
             Self::System(file) => {
-                let (mut file, mut bytes) = (file, Vec::new());
+                let mut file = file;
+                let mut bytes = Vec::new();
                 file.seek(SeekFrom::Start(at))?;
                 file.take(most).read_to_end(&mut bytes)?;
                 Ok(bytes)
@@ -70,7 +71,8 @@ impl Store {
             Self::System(file) => file.write_all_at(bytes, at),
             Self::Simulated(content) => {
                 killed()?;
-                let (mut content, end) = (content.borrow_mut(), at as usize + bytes.len());
+                let mut content = content.borrow_mut();
+                let end = at as usize + bytes.len();
                 let length = content.len().max(end);
                 content.resize(length, 0);
                 content[at as usize..end].copy_from_slice(bytes);

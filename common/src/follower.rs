@@ -114,7 +114,8 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
                 break true;
             }
             if self.ending {
-                (self.joined, self.ending) = (None, false);
+                self.joined = None;
+                self.ending = false;
                 return Ok(Event::Disconnected);
             }
             if self.on_disconnected() {

@@ -61,7 +61,8 @@ impl Run {
 
     pub fn parse(text: &str, file: &Path) -> Result<Self, RunError> {
         toml::from_str(text).map_err(|error| {
-            let (file, problem) = (file.to_owned(), error.message().to_owned());
+            let file = file.to_owned();
+            let problem = error.message().to_owned();
             let by = toml::from_str(text).ok().and_then(|run: toml::Table| {
                 let by = run.get(WRITTEN_BY)?.as_str()?;
                 (by != VERSION).then(|| by.to_owned())

@@ -402,7 +402,8 @@ impl<P: Process> Work<P> {
         self.process.after_ready(context)?;
         let simulated = context.run.mission.robot.address.is_none();
         let faults = Requests::open(&context.bus, context.generation.stage, simulated)?;
-        (self.faults, self.idled) = (Some(faults), Instant::now());
+        self.faults = Some(faults);
+        self.idled = Instant::now();
         Ok(())
     }
 
@@ -435,8 +436,11 @@ impl<P: Process> Work<P> {
         if ignored.process != self.foreign {
             self.foreign = ignored.process;
             let what = "its samples are ignored, because the supervisor's roster lacks it";
-            let (input, remedy) = (format!("process {}", self.foreign), "end it".to_owned());
-            let trouble = Refusal { input, what: what.to_owned(), remedy };
+            let trouble = Refusal {
+                input: format!("process {}", self.foreign),
+                what: what.to_owned(),
+                remedy: "end it".to_owned(),
+            };
             tracing::warn!("{trouble}");
             heartbeat.complain(&trouble)?;
         }
@@ -512,7 +516,8 @@ impl Heartbeat {
 
     fn beat_quietly(&mut self, state: HealthState, progress: Progress) -> Result {
         self.sample.state = state.into();
-        (self.last, self.tick) = (Instant::now(), progress.tick);
+        self.last = Instant::now();
+        self.tick = progress.tick;
         Ok(self.writer.publish_quietly(progress.tick, progress.time, self.sample, &[])?)
     }
 

@@ -62,8 +62,11 @@ pub fn start_with(
     options: impl IntoIterator<Item = OsString>,
 ) -> Result<Start, StageCommandError> {
     let failed = |problem: String| StageCommandError { stage, problem };
-    let (mut run, mut robot) = (None::<PathBuf>, None::<RobotName>);
-    let (mut number, mut first_tick, mut supervisor) = (None, None, None);
+    let mut run = None::<PathBuf>;
+    let mut robot = None::<RobotName>;
+    let mut number = None;
+    let mut first_tick = None;
+    let mut supervisor = None;
     let mut options = options.into_iter();
     while let Some(option) = options.next() {
         let value = options.next();

@@ -49,7 +49,8 @@ impl BusInstance {
             (name.len() == LENGTH && name.bytes().all(known)).then_some(name)
         });
         let name = name.ok_or_else(|| {
-            let (link, config) = (link.display(), config.display());
+            let link = link.display();
+            let config = config.display();
             let text = format!("{link} points to {config}, whose name is invalid for a bus configuration; start the robot again");
             io::Error::new(io::ErrorKind::InvalidData, text)
         })?;

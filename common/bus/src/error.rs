@@ -57,7 +57,8 @@ pub(super) fn refused<E: Debug>(
 }
 
 pub(super) fn reading(spec: &Spec) -> impl FnOnce(SubscriberCreateError) -> BusError {
-    let (topic, places) = (spec.name, spec.limits.readers);
+    let topic = spec.name;
+    let places = spec.limits.readers;
     move |error| match error {
         SubscriberCreateError::ExceedsMaxSupportedSubscribers => {
             BusError::NoPlace { topic, places }
@@ -67,7 +68,8 @@ pub(super) fn reading(spec: &Spec) -> impl FnOnce(SubscriberCreateError) -> BusE
 }
 
 pub(super) fn taking(spec: &Spec) -> impl FnOnce(ReceiveError) -> BusError {
-    let (topic, most) = (spec.name, spec.limits.borrowed);
+    let topic = spec.name;
+    let most = spec.limits.borrowed;
     move |error| match error {
         ReceiveError::ExceedsMaxBorrows => BusError::HoldsTooMany { topic, most },
         other => refused("read", topic)(other),

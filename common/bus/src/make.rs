@@ -242,7 +242,8 @@ impl Bus {
         leftovers::restore(&backup_of(node), &services_of(node))?;
         let config = node.config();
         let nodes = nodes_of(node);
-        let (mut outcome, mut all) = (Ok(()), true);
+        let mut outcome = Ok(());
+        let mut all = true;
         let listed = Node::<ipc::Service>::list(config, |listed| {
             if let NodeState::Dead(dead) = listed {
                 match remove_unfilled(node, leftovers::process_of(dead.id().value())) {

@@ -95,7 +95,8 @@ impl Places {
 
     /// Returns whether it succeeded.
     pub(crate) fn reserve_behind(&self, taken: usize) -> bool {
-        let (start, end) = (self.reserved.get(), taken + 2 * self.length);
+        let start = self.reserved.get();
+        let end = taken + 2 * self.length;
         if end <= start {
             return true;
         }

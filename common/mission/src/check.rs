@@ -135,7 +135,8 @@ fn remarks(text: &str, origin: &Path, tree: &DeTable<'_>, mission: &Mission) -> 
         remark("controller.speed_m_s", text)
     });
     let shut = mission.waypoints().into_iter().find(|to| reach::is_cut_off(mission, to.at)).map(|to| {
-        let (at, radius) = (to.at, mission.body().radius_m);
+        let at = to.at;
+        let radius = mission.body().radius_m;
         let key = if mission.targets.is_empty() { "target" } else { "targets" };
         let text = format!("known shapes and zones block every path to {at} for a body of {radius} m radius; move the target, or the shapes around it");
         remark(key, text)
@@ -155,10 +156,14 @@ fn remarks(text: &str, origin: &Path, tree: &DeTable<'_>, mission: &Mission) -> 
 fn thresholds(mission: &Mission) -> [(&'static str, f64, &'static str, f64); 4] {
     let Physics { battery, heights, radio, .. } = mission.simulation.physics();
     let BatteryLimits { board, motor, servo } = mission.robot.low_battery_v;
-    let (stops_m, slows_m) = (mission.arrival_tolerance_m, mission.controller.slow_radius_m);
     let clearance_m = heights.ground_clearance_m;
     [
-        ("arrival_tolerance_m", stops_m, "controller.slow_radius_m", slows_m),
+        (
+            "arrival_tolerance_m",
+            mission.arrival_tolerance_m,
+            "controller.slow_radius_m",
+            mission.controller.slow_radius_m,
+        ),
         (
             "robot.low_battery_v",
             board.max(motor).max(servo),
@@ -198,7 +203,8 @@ fn dropped_of(
     match (file, read) {
         (DeValue::Table(file), read) => dropped(key, file, read),
         (DeValue::Array(file), toml::Value::Array(read)) if file.len() > read.len() => {
-            let (has, takes) = (file.len(), read.len());
+            let has = file.len();
+            let takes = read.len();
             Some((start, key.to_owned(), format!("the list has {has} values instead of {takes}")))
         }
         (DeValue::Array(file), toml::Value::Array(read)) => file

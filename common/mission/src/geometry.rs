@@ -126,7 +126,8 @@ rows! {
 impl Zone {
     /// Returns the distance to its edge, metres; negative inside.
     pub fn clearance(&self, point: DVec2) -> f64 {
-        let (mut nearest, mut is_inside) = (f64::INFINITY, false);
+        let mut nearest = f64::INFINITY;
+        let mut is_inside = false;
         for (from, to) in ring(&self.points) {
             nearest = nearest.min(distance_to_segment(point, from, to));
             let way = to - from;
@@ -256,7 +257,8 @@ pub fn nearest_on_segment(point: DVec2, from: DVec2, to: DVec2) -> DVec2 {
 /// Returns the standard deviations along the principal axes of the position covariance
 /// `[xx, xy, yy]`, and the major axis's angle from x, radians.
 pub fn principal_axes([xx, xy, yy]: [f64; 3]) -> ([f64; 2], f64) {
-    let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
+    let mean = 0.5 * (xx + yy);
+    let half = 0.5 * (xx - yy);
     let variances = [mean + half.hypot(xy), mean - half.hypot(xy)];
     (variances.map(|variance| variance.max(0.0).sqrt()), 0.5 * xy.atan2(half))
 }

@@ -66,7 +66,8 @@ impl Window {
         if self.area() == 0 {
             return Self { col: cell.col, row: cell.row, width: 1, height: 1 };
         }
-        let (col, row) = (self.col.min(cell.col), self.row.min(cell.row));
+        let col = self.col.min(cell.col);
+        let row = self.row.min(cell.row);
         Self {
             col,
             row,
@@ -87,8 +88,8 @@ impl Window {
             return self;
         }
         let Self { col, row, width, height } = other;
-        let (last_col, last_row) = (col + width - 1, row + height - 1);
-        self.including(Cell { col, row }).including(Cell { col: last_col, row: last_row })
+        let last = Cell { col: col + width - 1, row: row + height - 1 };
+        self.including(Cell { col, row }).including(last)
     }
 }
 

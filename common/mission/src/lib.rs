@@ -540,7 +540,8 @@ impl Mission {
     }
 
     pub fn wheel_physics(&self) -> WheelPhysics {
-        let (written, stated) = (&self.simulation.wheels, &self.robot.response);
+        let written = &self.simulation.wheels;
+        let stated = &self.robot.response;
         let preset = self.simulation.physics().wheels;
         let response = self.body().response;
         WheelPhysics {

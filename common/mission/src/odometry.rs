@@ -107,7 +107,8 @@ impl Calibration {
         let odometry = file.robot.odometry;
         for (key, value, range) in odometry.ranges() {
             if !range.contains(&value) {
-                let (least, most) = (range.start(), range.end());
+                let least = range.start();
+                let most = range.end();
                 return Err(format!("{key} = {value} is outside {least} to {most}"));
             }
         }

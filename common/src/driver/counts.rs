@@ -43,7 +43,8 @@ impl WheelCounts {
         if let (Self::Endless(new), Self::Endless(old)) = (self, before) {
             return [0, 1].map(|wheel| new[wheel] - old[wheel]);
         }
-        let (new, old) = (self.cyclic(), before.cyclic());
+        let new = self.cyclic();
+        let old = before.cyclic();
         [0, 1].map(|wheel| counts_between(old[wheel], new[wheel]).into())
     }
 

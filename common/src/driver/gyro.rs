@@ -50,7 +50,8 @@ impl Compared {
     /// comparison fails.
     pub fn take(&mut self, now_ns: i64, turns: [f64; 2]) -> Option<String> {
         if !(0..COMPARED_NS).contains(&(now_ns - self.since_ns)) {
-            (self.since_ns, self.turned) = (now_ns, [0.0; 2]);
+            self.since_ns = now_ns;
+            self.turned = [0.0; 2];
         }
         self.turned = [0, 1].map(|of| self.turned[of] + turns[of]);
         let [odometry, gyro] = self.turned;
@@ -60,7 +61,8 @@ impl Compared {
         if odometry.abs() < least_rad {
             return None;
         }
-        (self.since_ns, self.turned) = (now_ns, [0.0; 2]);
+        self.since_ns = now_ns;
+        self.turned = [0.0; 2];
         self.agrees = (1.0 / AGREES_WITHIN..=AGREES_WITHIN).contains(&(gyro / odometry));
         (!self.agrees).then(|| {
             format!("a turn of {gyro:.2} rad contradicts odometry's {odometry:.2} rad, so the gyro is ignored")

@@ -35,7 +35,9 @@ impl<T: Copy + PartialEq> Replica<T> {
     }
 
     pub fn apply(&mut self, part: &Part, cells: &[T]) -> Applied {
-        let (frame, window, version) = (part.frame(), part.window(), part.version);
+        let frame = part.frame();
+        let window = part.window();
+        let version = part.version;
         let sane = (1..=MAX_CELLS).contains(&frame.cells);
         if !sane || !frame.contains(window) || cells.len() != window.area() {
             return Applied::Missed;

@@ -53,7 +53,8 @@ impl PoseSample {
 
     /// Returns the pose in the odometry frame, which is free of corrections.
     pub fn odometry(&self) -> Pose2 {
-        let ([x, y, turn], Pose2 { position, heading }) = (self.map_from_odom, self.pose());
+        let [x, y, turn] = self.map_from_odom;
+        let Pose2 { position, heading } = self.pose();
         let position = DVec2::from_angle(-turn).rotate(position - DVec2::new(x, y));
         Pose2 { position, heading: heading - turn }
     }

@@ -89,7 +89,8 @@ impl Sweep {
 
     /// Returns the time of a beam among `beams` in a plausible sweep, relative to the tick.
     pub const fn beam_time_ns(&self, beam: usize, beams: usize) -> i64 {
-        let (first, beams) = (self.first_beam as usize, if beams == 0 { 1 } else { beams });
+        let first = self.first_beam as usize;
+        let beams = if beams == 0 { 1 } else { beams };
         let before = if self.beam_ns < 0 {
             (first + beams - beam) % beams
         } else {

@@ -311,8 +311,10 @@ impl Serialize for StallSample {
             resets: u64,
         }
         let Self { stamp, x_m, y_m, epoch, replans, resets, .. } = *self;
-        let (tick, time_s, cause, recovery) =
-            (stamp.tick, stamp.seconds(), self.cause(), self.recovery());
+        let tick = stamp.tick;
+        let time_s = stamp.seconds();
+        let cause = self.cause();
+        let recovery = self.recovery();
         Stall { tick, time_s, x_m, y_m, cause, recovery, epoch, replans, resets }.serialize(to)
     }
 }

@@ -97,7 +97,8 @@ fn write(messages: &Messages, name: &str, layouts: &[(&str, Vec<Line>)]) -> Stri
     let (mut members, mut values, mut constants) = <(String, String, String)>::default();
     let mut known = BTreeSet::new();
     for line in layouts.iter().flat_map(|(_, lines)| lines).filter(|line| known.insert(*line)) {
-        let (kind, [_, name, value]) = (rust(&line[0]), line);
+        let kind = rust(&line[0]);
+        let [_, name, value] = line;
         let array =
             kind.rsplit_once("; ").map(|(_, count)| format!("[Default::default(); {count}"));
         let default = match value.as_str() {

@@ -79,7 +79,8 @@ pub struct Arduino {
 
 impl Arduino {
     pub fn new(mission: &Mission) -> Self {
-        let (robot, body) = (&mission.robot, mission.body());
+        let robot = &mission.robot;
+        let body = mission.body();
         let pin = |(row, sensor): (usize, Sensor)| {
             Some((*robot.arduino.sonars.get(&sensor.name)?, row, sensor))
         };
@@ -117,7 +118,8 @@ impl Arduino {
             (Answer::Counts(counts, gyro), Waits::Round { since, ranges })
                 if ranges.len() == self.sonars.len() =>
             {
-                let (since, ranges) = (*since, std::mem::take(ranges));
+                let since = *since;
+                let ranges = std::mem::take(ranges);
                 self.waits = Waits::No;
                 for ((_, row, sensor), centimetres) in self.sonars.iter().zip(ranges) {
                     // 0 means no echo.
@@ -209,7 +211,8 @@ impl Base for Arduino {
 
     fn poll(&mut self) -> Vec<u8> {
         self.polls += 1;
-        let (now, overdue) = (self.polls, self.overdue);
+        let now = self.polls;
+        let overdue = self.overdue;
         if let Waits::Round { since, ranges } = &self.waits
             && now - since >= overdue
         {

@@ -69,7 +69,8 @@ impl ErrorModel {
     /// The shares are of ratio, track and distance.
     pub(crate) fn corrected(&self, by_counts: Twist, shares: [f64; 3]) -> Twist {
         let [ratio, track, distance] = shares;
-        let (v, omega) = (by_counts.v * (1.0 + distance), by_counts.omega * (1.0 + distance));
+        let v = by_counts.v * (1.0 + distance);
+        let omega = by_counts.omega * (1.0 + distance);
         if self.steers {
             return Twist { v, omega: omega * (1.0 + ratio) };
         }

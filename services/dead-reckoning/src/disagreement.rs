@@ -125,7 +125,8 @@ impl Disagreement {
             return None;
         }
         self.pair = [second, Some(*newest)];
-        let (before, fix) = (first?, second?);
+        let before = first?;
+        let fix = second?;
         if !APART_S.contains(&apart_s(&before, &fix)) {
             return None;
         }
@@ -133,7 +134,8 @@ impl Disagreement {
             moved(ticks, before.time.seconds() - shift_s, fix.time.seconds() - shift_s)
         };
         let by_wheels = moved(0.0)?;
-        let (from, heading) = (before.heading?, fix.heading?);
+        let from = before.heading?;
+        let heading = fix.heading?;
         let way = (fix.position - before.position).rotate(glam::DVec2::from_angle(-from));
         let turn = wrapped(heading - from);
         let mut squares = [0.0; SHIFTS];

@@ -186,7 +186,8 @@ impl Anchor {
             let [xx, _, _, yy, _, tt] = fix.covariance;
             let own = [xx, yy, tt];
             let known = [0, 1, 2].map(|part| own[part].max(variances[part]));
-            (self.variances, self.shared) = (Some(known), self.newest);
+            self.variances = Some(known);
+            self.shared = self.newest;
             let arm = DVec2::from_angle(error[2]).rotate(self.frame.position - pose.position);
             self.frame.position = pose.position + DVec2::new(error[0], error[1]) + arm;
             self.frame.heading += error[2];
@@ -228,7 +229,9 @@ impl Filter {
             let mut own = joint.fixed_view_mut::<PARTS, PARTS>(0, 0);
             own += noise;
             let mut seen = SMatrix::<f64, 1, JOINT>::zeros();
-            (seen[2], seen[BIAS], seen[PARTS]) = (1.0, tick.seconds, -1.0);
+            seen[2] = 1.0;
+            seen[BIAS] = tick.seconds;
+            seen[PARTS] = -1.0;
             let expected = moved.omega + self.bias * tick.seconds;
             let scale = GYRO_SCALE * gyro.turn;
             let variance = SMatrix::from([gyro.variance + scale * scale]);
@@ -268,9 +271,11 @@ impl Filter {
     fn updated(&self, fix: &Fix, there: Pose2) -> Option<(Error, Matrix)> {
         let lever = self.pose.position - there.position;
         let mut seen = SMatrix::<f64, 3, PARTS>::identity();
-        (seen[(0, 2)], seen[(1, 2)]) = (lever.y, -lever.x);
+        seen[(0, 2)] = lever.y;
+        seen[(1, 2)] = -lever.x;
         let [x, y] = (fix.position - there.position).to_array();
-        let (mut covariance, noise) = (self.covariance, fix.noise());
+        let mut covariance = self.covariance;
+        let noise = fix.noise();
         match fix.heading {
             Some(heading) => {
                 let residual = SVector::from([x, y, wrapped(heading - there.heading)]);
@@ -350,9 +355,9 @@ pub(crate) struct History {
 
 impl fmt::Debug for History {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (ticks, fixes) = (self.ticks.len(), self.fixes.len());
         let mut shown = f.debug_struct("History");
-        shown.field("pose", &self.newest.pose).field("ticks", &ticks).field("fixes", &fixes);
+        shown.field("pose", &self.newest.pose);
+        shown.field("ticks", &self.ticks.len()).field("fixes", &self.fixes.len());
         shown.finish_non_exhaustive()
     }
 }

@@ -45,7 +45,8 @@ impl Gyro {
         let whole = seconds(before.end, end);
         assert!(whole > 0.0);
         let mut rest = Self { sequence, end, ..before };
-        let (mut given, mut completed) = (0.0, false);
+        let mut given = 0.0;
+        let mut completed = false;
         for tick in ticks.iter_mut().filter(|tick| tick.time > before.end && tick.time <= end) {
             let share = seconds(before.end, tick.time) / whole;
             assert!((0.0..=1.0).contains(&share));
@@ -58,7 +59,9 @@ impl Gyro {
                 tick.gyro = Some(GyroTurn { turn, variance });
                 completed = true;
             }
-            (rest.since, rest.turn, rest.variance) = (tick.time, 0.0, divided * divided);
+            rest.since = tick.time;
+            rest.turn = 0.0;
+            rest.variance = divided * divided;
             given = share;
         }
         rest.turn += (1.0 - given) * turn_rad;

@@ -54,7 +54,8 @@ impl Contradictions {
         let mean = |of: fn(&Pose2, &Fix) -> DVec2| {
             self.0.iter().map(|(pose, fix)| of(pose, fix)).sum::<DVec2>() * share
         };
-        let (from, to) = (mean(|pose, _| pose.position), mean(|_, fix| fix.position));
+        let from = mean(|pose, _| pose.position);
+        let to = mean(|_, fix| fix.position);
         let variance = self.0.iter().map(|(_, fix)| fix.variance()).sum::<f64>() * share + WHEELS;
         let (turn, heading) = self.turned(from, to, variance);
         let turned = DVec2::from_angle(turn);
@@ -87,7 +88,8 @@ impl Contradictions {
             return (0.0, UNKNOWN);
         }
         let sum = |of: fn((DVec2, DVec2)) -> f64| arms.clone().map(of).sum::<f64>();
-        let (cosine, sine) = (sum(|(a, b)| a.dot(b)), sum(|(a, b)| a.perp_dot(b)));
+        let cosine = sum(|(a, b)| a.dot(b));
+        let sine = sum(|(a, b)| a.perp_dot(b));
         let turn = sine.atan2(cosine);
         let is_turn = turn * turn > NO_TURN * NO_TURN * variance / spread;
         (if is_turn { turn } else { 0.0 }, variance / spread)

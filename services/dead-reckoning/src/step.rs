@@ -202,7 +202,8 @@ impl DeadReckoning {
         now: MissionTime,
     ) -> Reckoned {
         let mut motion = Twist::default();
-        let (mut rejected, mut elapsed) = (false, 0.0);
+        let mut rejected = false;
+        let mut elapsed = 0.0;
         let mut tick = Tick { time: now, ..Tick::default() };
         let is_its = |counts: &&CountsSample| counts.stamp.tick == wheels.stamp.tick;
         let endless = counts.iter().rfind(is_its);
@@ -235,7 +236,10 @@ impl DeadReckoning {
         if let Some(place) = &place {
             self.place(place);
         }
-        let (mut relocated, mut by_scan, mut refused, mut disagree) = (false, false, None, None);
+        let mut relocated = false;
+        let mut by_scan = false;
+        let mut refused = None;
+        let mut disagree = None;
         for sample in fixes {
             let fix = Fix::try_from(sample);
             let taken = self.take_fix(fix);
@@ -325,7 +329,8 @@ impl DeadReckoning {
             if state.relocations >= MOST_RELOCATIONS {
                 return Taken::Refused(FixRefusal::Contradicts);
             }
-            let (from, to) = (estimate.pose, elsewhere.pose);
+            let from = estimate.pose;
+            let to = elsewhere.pose;
             state.doubt.relocate(to.position - from.position, wrapped(to.heading - from.heading));
             state.history.restart(elsewhere);
             state.relocations += 1;
@@ -435,7 +440,8 @@ impl DeadReckoning {
     fn speeds(&self, moved: Twist, elapsed: f64) -> Twist {
         let time = elapsed.max(LEAST_SHARE_OF_A_TICK * self.period_s);
         assert!(time > 0.0);
-        let (v, omega) = (moved.v / time, moved.omega / time);
+        let v = moved.v / time;
+        let omega = moved.omega / time;
         let wheel = match self.body.steering {
             Some(_) => v.abs(),
             None => v.abs() + omega.abs() * self.body.track_m / 2.0,

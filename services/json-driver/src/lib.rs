@@ -167,7 +167,9 @@ fn scan_of(
     [age_s, time_s]: [Option<f64>; 2],
 ) -> Result<LaserScan, Refusal> {
     if beams.len() != sensor.beams {
-        let (came, name, want) = (beams.len(), &sensor.name, sensor.beams);
+        let came = beams.len();
+        let name = &sensor.name;
+        let want = sensor.beams;
         return Err(Refusal {
             input: "scan".to_owned(),
             what: format!("the scan has {came} beams, and {name:?} has {want}"),

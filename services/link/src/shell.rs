@@ -231,7 +231,8 @@ impl Process for Shell {
     }
 
     fn trouble(&mut self) -> Option<Refusal> {
-        let (link, now_ns) = (&self.runner.stage.link, monotonic_ns());
+        let link = &self.runner.stage.link;
+        let now_ns = monotonic_ns();
         let is_told = !link.connected() || self.transport.is_cut();
         let base = is_told.then(|| self.transport.trouble()).flatten();
         self.refused.take_if(|(_, at_ns)| now_ns.saturating_sub(*at_ns) > REFUSAL_LASTS_NS);

@@ -181,7 +181,8 @@ impl Link {
     pub fn step(&mut self, entry: Entry<'_>) -> Vec<Effect> {
         let Entry { event, machine_ns, now } = entry;
         self.is_after_pause |= has_passed(self.now_ns, machine_ns, PAUSED_AFTER);
-        (self.now, self.now_ns) = (now, machine_ns);
+        self.now = now;
+        self.now_ns = machine_ns;
         if !self.in_ticks() {
             self.stood.get_or_insert(now);
         }
@@ -201,7 +202,8 @@ impl Link {
                 self.observe(Observation::Resumed);
             }
             Event::TickLimit { last_tick, target_number } => {
-                (self.last_tick, self.target_number) = (Some(last_tick), target_number);
+                self.last_tick = Some(last_tick);
+                self.target_number = target_number;
             }
             Event::Quiet => self.is_after_pause = false,
             Event::Operator(Request::SignOff | Request::Look) => {}
@@ -463,7 +465,8 @@ impl Link {
     }
 
     fn is_due(&mut self, open: &mut OpenTick) -> bool {
-        let (tick, in_ticks) = (self.open_number(), self.in_ticks());
+        let tick = self.open_number();
+        let in_ticks = self.in_ticks();
         match open.given_ns {
             None if in_ticks && self.arrived() => return false,
             None if in_ticks && self.last_tick.is_some_and(|last| tick > last) => {

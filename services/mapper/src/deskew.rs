@@ -63,7 +63,8 @@ impl Poses {
         debug_assert!(self.held.iter().is_sorted_by(|one, next| one.0 < next.0));
         let last = self.held.len().max(2) - 1;
         let later = self.held.partition_point(|(at, _)| *at < ns).clamp(1, last);
-        let ((from_ns, from), (to_ns, to)) = (self.held.get(later - 1)?, self.held.get(later)?);
+        let (from_ns, from) = self.held.get(later - 1)?;
+        let (to_ns, to) = self.held.get(later)?;
         assert!(from_ns < to_ns);
         let share = (ns - from_ns) as f64 / (to_ns - from_ns) as f64;
         (-1.0..=2.0).contains(&share).then(|| Pose2 {
@@ -127,7 +128,9 @@ fn at_once<'a>(fan: &Fan<'_>, seen_from: impl Fn(usize) -> Option<Fan<'a>>) -> O
     let count = fan.beams.len();
     assert!(count > 0 && fan.step_rad > 0.0);
     let end = |(beam, range): (usize, &f32)| {
-        let (own, range, place) = (seen_from(beam)?, f64::from(*range), beam as f64);
+        let own = seen_from(beam)?;
+        let range = f64::from(*range);
+        let place = beam as f64;
         let along = DVec2::from_angle(own.first_rad + own.step_rad * place);
         let to = own.origin + range * along - fan.origin;
         let ends = (0.0..=fan.reach_m).contains(&range);

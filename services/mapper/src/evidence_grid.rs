@@ -190,7 +190,8 @@ impl EvidenceGrid {
         let mut arc = Vec::new();
         let mut explained = false;
         // All relevant cells lie within `near`, or in the widest cone's triangle.
-        let (end, aside) = (far * beam.axis, far * outside * beam.axis.perp());
+        let end = far * beam.axis;
+        let aside = far * outside * beam.axis.perp();
         let corners = [DVec2::splat(near), DVec2::splat(-near), end + aside, end - aside];
         let least = corners.into_iter().fold(DVec2::ZERO, DVec2::min);
         let greatest = corners.into_iter().fold(DVec2::ZERO, DVec2::max);
@@ -209,7 +210,8 @@ impl EvidenceGrid {
         for cell in lattice.between(beam.origin + least, beam.origin + greatest).cells() {
             let offset = lattice.centre_of(cell) - beam.origin;
             let range = offset.length();
-            let (across, along) = (beam.axis.perp_dot(offset).abs(), beam.axis.dot(offset));
+            let across = beam.axis.perp_dot(offset).abs();
+            let along = beam.axis.dot(offset);
             if range > far || range > near && across > along * outside {
                 continue;
             }
@@ -305,12 +307,14 @@ impl EvidenceGrid {
         let far = clear_m.max(hit_m.unwrap_or(0.0)) + half_cell;
         let aside = half_cell.max(SCANNED_ASIDE_M);
         let end = ray.origin + far * ray.axis;
-        let (least, greatest) = (ray.origin.min(end), ray.origin.max(end));
+        let least = ray.origin.min(end);
+        let greatest = ray.origin.max(end);
         let reach = aside + half_cell;
         for cell in lattice.between(least - reach, greatest + reach).cells() {
             let centre = lattice.centre_of(cell);
             let offset = centre - ray.origin;
-            let (across, along) = (ray.axis.perp_dot(offset), ray.axis.dot(offset));
+            let across = ray.axis.perp_dot(offset);
+            let along = ray.axis.dot(offset);
             let on_ray = across.abs() <= half_cell;
             if across.abs() > aside || along < -half_cell {
                 continue;
@@ -361,7 +365,8 @@ impl EvidenceGrid {
         let rim = radius - sonar::RIM_M..=radius + lattice.resolution_m;
         for cell in lattice.around(touch.robot, *rim.end()).cells() {
             let offset = lattice.centre_of(cell) - touch.robot;
-            let (across, along) = (touch.axis.perp_dot(offset), touch.axis.dot(offset));
+            let across = touch.axis.perp_dot(offset);
+            let along = touch.axis.dot(offset);
             if rim.contains(&offset.length()) && across.atan2(along).abs() <= touch.half_width {
                 let index = lattice.index(cell);
                 self.side[index] = side_of(touch.axis);

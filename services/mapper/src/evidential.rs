@@ -179,7 +179,8 @@ impl Evidential {
 
     /// Returns the same as [`Evidential::take`].
     fn follow(&self, map: &mut EvidenceMap) -> (Window, bool) {
-        let (mut window, mut is_new) = (Window::default(), false);
+        let mut window = Window::default();
+        let mut is_new = false;
         let news: Vec<_> = map.grids().map(|grid| std::mem::take(&mut grid.news)).collect();
         for news in news {
             window = window.union(self.on_grid(news.window));
@@ -238,7 +239,8 @@ impl Evidential {
             return window;
         }
         assert!(self.ground.lattice.contains(window));
-        let (grid, lattice) = (self.grid, self.ground.lattice);
+        let grid = self.grid;
+        let lattice = self.ground.lattice;
         let last = Cell { col: window.col + window.width - 1, row: window.row + window.height - 1 };
         // A lattice cell acts up to half a cell of both grids beyond its centre.
         let more = 0.5 * (lattice.resolution_m + grid.resolution_m);

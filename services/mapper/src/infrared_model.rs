@@ -50,7 +50,8 @@ pub(crate) fn seen(reading: &RangeReading, reach_m: f64) -> Option<Seen> {
 
 fn deviation_m(range_m: f64) -> f64 {
     // Counts are a / range + b; the formula at two ranges gives `a`.
-    let (near, far) = (f64::from(infrared_ad(0.2)), f64::from(infrared_ad(0.4)));
+    let near = f64::from(infrared_ad(0.2));
+    let far = f64::from(infrared_ad(0.4));
     let counts_metres = (near - far) / (1.0 / 0.2 - 1.0 / 0.4);
     assert!(counts_metres > 0.0, "nearer reads more");
     NOISE_AD * range_m * range_m / counts_metres

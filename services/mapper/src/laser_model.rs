@@ -190,8 +190,11 @@ impl<'a> Scan<'a> {
         let turn = std::f64::consts::TAU / self.fan.step_rad;
         let middle = (offset.to_angle() - self.fan.first_rad) / self.fan.step_rad;
         let first = (middle - half).rem_euclid(turn);
-        let (mut ended, mut passed, mut passed_by_noise) = (0_u32, 0_u32, 0_u32);
-        let (mut run, mut neighbours) = (0_u32, 0_u32);
+        let mut ended = 0_u32;
+        let mut passed = 0_u32;
+        let mut passed_by_noise = 0_u32;
+        let mut run = 0_u32;
+        let mut neighbours = 0_u32;
         for step in 0..=(2.0 * half).ceil() as usize {
             let beam = (first + step as f64).rem_euclid(turn) as usize;
             let Some(Beam { along, range, ends }) = self.beams.get(beam).copied() else {
@@ -222,7 +225,9 @@ impl<'a> Scan<'a> {
 
     fn index(&self, cell: IVec2) -> Option<usize> {
         // The cast maps negative numbers to large ones.
-        let (col, row, side) = (cell.x as u32, cell.y as u32, self.lattice.cells);
+        let col = cell.x as u32;
+        let row = cell.y as u32;
+        let side = self.lattice.cells;
         (col < side && row < side).then(|| (row * side + col) as usize)
     }
 }
@@ -233,7 +238,8 @@ fn fill(side: u32, corners: &[DVec2], mut span: impl FnMut(u32, Range<u32>)) {
     let mut crossings = vec![Vec::new(); side as usize];
     let before = corners.last().into_iter().chain(corners);
     for (from, to) in before.zip(corners) {
-        let (least, greatest) = (from.y.min(to.y), from.y.max(to.y));
+        let least = from.y.min(to.y);
+        let greatest = from.y.max(to.y);
         let slope = (to.x - from.x) / (to.y - from.y);
         // Of two edges that meet at a row's centre, one crosses it.
         let (first, end) = ((least.floor() + 1.0).max(0.0), greatest.floor().min(last) + 1.0);
@@ -247,7 +253,8 @@ fn fill(side: u32, corners: &[DVec2], mut span: impl FnMut(u32, Range<u32>)) {
         assert!(crossings.len().is_multiple_of(2), "the polygon is closed");
         crossings.sort_unstable_by(f64::total_cmp);
         for pair in crossings.chunks_exact(2) {
-            let (from, to) = (pair[0].ceil().max(0.0), pair[1].floor().min(last));
+            let from = pair[0].ceil().max(0.0);
+            let to = pair[1].floor().min(last);
             if from <= to {
                 span(row, from as u32..to as u32 + 1);
             }

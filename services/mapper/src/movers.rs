@@ -213,13 +213,15 @@ impl Movers {
     /// Places the movers around `pose`, which is `robot` in the frame of the scans.
     pub(crate) fn place(&mut self, pose: &PoseSample, robot: Pose2) {
         let turned = DVec2::from_angle(pose.heading_rad - robot.heading);
-        let (at_s, robot) = (pose.stamp.seconds(), turned.rotate(robot.position));
+        let at_s = pose.stamp.seconds();
+        let robot = turned.rotate(robot.position);
         let [x, y] = (pose.pose().position - robot).to_array();
         let movers = self.tracks.iter().filter(|it| it.is_mover && at_s - it.seen_s <= HIDDEN_S);
         let mover = |track: &Track| {
             let unseen_s = (at_s - track.seen_s - CAME_S).max(0.0);
             let [place, _, velocity] = track.variance.map(f64::sqrt);
-            let (at, toward) = (turned.rotate(track.at(at_s)), turned.rotate(track.velocity));
+            let at = turned.rotate(track.at(at_s));
+            let toward = turned.rotate(track.velocity);
             Mover {
                 x_m: (at.x + x) as f32,
                 y_m: (at.y + y) as f32,
@@ -268,7 +270,8 @@ impl Track {
     }
 
     fn variance_at(&self, at_s: f64) -> [f64; 3] {
-        let (for_s, [place, both, velocity]) = (at_s - self.seen_s, self.variance);
+        let for_s = at_s - self.seen_s;
+        let [place, both, velocity] = self.variance;
         let grown = GROWS * for_s;
         [
             place + for_s * (2.0 * both + for_s * (velocity + grown / 3.0)),
@@ -370,7 +373,8 @@ fn older<'a>(
 
 fn things(fan: &Fan<'_>, before: Option<&Fan<'_>>, at_s: f64) -> Vec<Thing> {
     let ends: Vec<_> = fan.ends().collect();
-    let (count, is_circle) = (ends.len(), fan.is_circle());
+    let count = ends.len();
+    let is_circle = fan.is_circle();
     let range = |beam: usize| {
         ends[beam % count].map_or(f64::INFINITY, |end: DVec2| end.distance(fan.origin))
     };
@@ -381,7 +385,8 @@ fn things(fan: &Fan<'_>, before: Option<&Fan<'_>>, at_s: f64) -> Vec<Thing> {
     // Cut a circle at a gap.
     let cut = (0..count).find(|beam| is_circle && !joins(*beam)).map_or(0, |beam| beam + 1);
     let end = cut + count;
-    let (mut things, mut first) = (Vec::new(), cut);
+    let mut things = Vec::new();
+    let mut first = cut;
     while first < end {
         let last = (first..end - 1).find(|beam| !joins(*beam)).unwrap_or(end - 1);
         let points: Vec<_> = (first..=last).filter_map(|beam| ends[beam % count]).collect();
@@ -394,7 +399,8 @@ fn things(fan: &Fan<'_>, before: Option<&Fan<'_>>, at_s: f64) -> Vec<Thing> {
         let [from_own, to_own] = [is_own(first, former), is_own(last, next)];
         first = last + 1;
         let [Some(from), Some(to)] = [points.first(), points.last()] else { continue };
-        let (width_m, number) = (from.distance(*to), points.len() as f64);
+        let width_m = from.distance(*to);
+        let number = points.len() as f64;
         if width_m > WIDEST_M {
             continue;
         }
@@ -426,7 +432,8 @@ impl Difference {
     fn of(before: &Fan<'_>, end: DVec2) -> Self {
         let way = end - before.origin;
         assert!(before.step_rad > 0.0);
-        let (beam, count) = (before.beam_along(way), before.beams.len());
+        let beam = before.beam_along(way);
+        let count = before.beams.len();
         let by = |beside: usize| {
             let beam = beam + count + beside - 1;
             let beam = if before.is_circle() { beam % count } else { beam.wrapping_sub(count) };

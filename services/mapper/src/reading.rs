@@ -48,7 +48,8 @@ impl Rows {
     pub(crate) fn scan<'a>(&self, row: usize, robot: Pose2, beams: &'a [f32]) -> Option<Fan<'a>> {
         let is_scan = |laser: &&Sensor| laser.kind == SensorKind::Scan && !beams.is_empty();
         let laser = self.used(row).filter(is_scan)?;
-        let (mount, (first, step_rad)) = (laser.mount.on(robot), laser.fan());
+        let mount = laser.mount.on(robot);
+        let (first, step_rad) = laser.fan();
         assert!(step_rad > 0.0 && laser.reach_m > 0.0);
         Some(Fan {
             origin: mount.position,
@@ -83,8 +84,13 @@ impl Rows {
                 RangeStatus::Nothing => None,
                 _ => Some(safety_distance(reading)?).filter(|range| *range <= cone.reach_m),
             };
-            let (ranger, sonar) = (cone.mount.on(robot), SonarModel::of(cone));
-            Some(Reading { origin: ranger.position, axis: ranger.axis(), echo, sonar })
+            let ranger = cone.mount.on(robot);
+            Some(Reading {
+                origin: ranger.position,
+                axis: ranger.axis(),
+                echo,
+                sonar: SonarModel::of(cone),
+            })
         })
     }
 

@@ -155,7 +155,8 @@ impl ScanMatcher {
         movers: &mut Movers,
     ) -> Option<FixSample> {
         let scan = scans.iter().find(|scan| scan.row == self.row)?;
-        let (reckoned, odometry) = (scan.robot.pose(), scan.robot.odometry());
+        let reckoned = scan.robot.pose();
+        let odometry = scan.robot.odometry();
         if !(is_finite(reckoned) && is_finite(odometry)) {
             return None;
         }
@@ -224,7 +225,8 @@ impl Surroundings {
         let carried = DMat3::from_cols(DVec3::X, DVec3::Y, way.perp().extend(1.0));
         self.drift = carried * self.drift * carried.transpose() + lost;
         self.travelled_m += way.length();
-        (self.pose, self.odometry) = (pose, odometry);
+        self.pose = pose;
+        self.odometry = odometry;
     }
 
     fn has_left_keyframe(&self) -> bool {
@@ -275,8 +277,11 @@ impl Surroundings {
         let holds = search == Search::Held;
         // The full deviation: wheels at rest would hold the first round of a search where it is.
         let prior = if holds { self.prior(odometry) } else { variances(PRIOR) }.inverse();
-        let (mut pose, mut gate_m) = (start, GATES_M[usize::from(search != Search::Wide)]);
-        let (mut information, mut squares, mut fits) = (DMat3::ZERO, 0.0, Vec::new());
+        let mut pose = start;
+        let mut gate_m = GATES_M[usize::from(search != Search::Wide)];
+        let mut information = DMat3::ZERO;
+        let mut squares = 0.0;
+        let mut fits = Vec::new();
         let mut votes = 0.0;
         for _ in 0..ROUNDS {
             let turned = DVec2::from_angle(pose.heading);
@@ -310,7 +315,8 @@ impl Surroundings {
             let weight = if holds { 1.0 } else { (1.0 + gone.dot(prior * gone)).recip() };
             let prior = weight * prior;
             let mut pull = -(prior * gone);
-            (information, squares) = (DMat3::ZERO, 0.0);
+            information = DMat3::ZERO;
+            squares = 0.0;
             for (off, by, weight) in &fits[..kept] {
                 information += *weight * DMat3::from_cols(by * by.x, by * by.y, by * by.z);
                 pull -= weight * off * by;
@@ -350,7 +356,8 @@ impl Surroundings {
         let oldest_m = self.travelled_m - KEPT_M;
         self.surfaces.retain(|surface| surface.seen_m >= oldest_m && !is_gone(surface));
         self.reindex();
-        let (mut new, mut all) = (0_u32, 0_u32);
+        let mut new = 0_u32;
+        let mut all = 0_u32;
         for Point { at, normal, deviation_m, .. } in points {
             let Some(normal) = normal else { continue };
             all += 1;

@@ -46,7 +46,8 @@ pub(crate) fn points(fan: &Fan<'_>) -> Vec<Point> {
     let mut points: Vec<_> = (0..ends.len()).filter_map(point).collect();
     let mut rest = &mut points[..];
     while let Some(first) = rest.first() {
-        let (first, mut last) = (first.at, first.at);
+        let first = first.at;
+        let mut last = first;
         let ends = rest.iter().position(|point| {
             let is_apart = !fan.joins(last, point.at) || point.at.distance(first) > WIDEST_M;
             last = point.at;
@@ -72,7 +73,9 @@ fn line_through<'a>(
     }
     let share = 1.0 / count as f64;
     let middle = points.clone().sum::<DVec2>() * share;
-    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    let mut xx = 0.0;
+    let mut xy = 0.0;
+    let mut yy = 0.0;
     for at in points {
         let off = *at - middle;
         xx += share * off.x * off.x;

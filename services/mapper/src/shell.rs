@@ -105,7 +105,8 @@ impl Process for Shell {
             let tick = pose.stamp.tick;
             let is_repeated = self.runner.out.at.tick == tick;
             self.runner.out.at = Progress::of(&pose.stamp);
-            let (mapper, inputs) = (&self.runner.stage, &mut self.inputs);
+            let mapper = &self.runner.stage;
+            let inputs = &mut self.inputs;
             let ranges = self.ranges.take(tick, || {
                 let Some(slice) = inputs.ranges.next_slice()? else {
                     return Ok(None);
@@ -119,7 +120,8 @@ impl Process for Shell {
                 && let Some(slice) = inputs.scan.next_slice()?
             {
                 let header = slice.header();
-                let (of, row) = (header.stamp.tick, header.sensor as usize);
+                let of = header.stamp.tick;
+                let row = header.sensor as usize;
                 // A repeated tick has its scans again.
                 let is_held = self.scans.iter().any(|(held, scan)| (*held, scan.row) == (of, row));
                 if of >= tick && !is_held && mapper.uses(header.sensor) {

@@ -64,15 +64,16 @@ impl Stage for Mapper {
         if let Some(fix) = self.take_fix() {
             out.publish(&SCAN_FIX, fix)?;
         }
-        let (frame, version) = (self.frame(), self.state().version);
+        let frame = self.frame();
+        let version = self.state().version;
         let part = match change {
             Change::None => return Ok(None),
             Change::Window(window) => Part::of(frame, window, version),
             Change::Whole => Part::whole(frame, version),
         };
         assert!(frame.contains(part.window()));
-        let (header, cells) = (self.header(part), &self.state().cells);
-        out.publish_slice(&GRID, header, &frame.cells_of(part.window(), cells))?;
+        let cells = frame.cells_of(part.window(), &self.state().cells);
+        out.publish_slice(&GRID, self.header(part), &cells)?;
         Ok(Some(part))
     }
 }

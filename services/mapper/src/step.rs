@@ -357,8 +357,8 @@ impl Mapper {
                 scan => self.poses.scan_at_once(&self.rows, &pose, scan),
             };
             let scans: Vec<_> = scans.into_iter().filter_map(placed).collect();
-            let (surroundings, movers) = (&mut self.belief.surroundings, &mut self.movers);
-            self.fix = self.matcher.step(&self.rows, surroundings, &scans, movers);
+            let surroundings = &mut self.belief.surroundings;
+            self.fix = self.matcher.step(&self.rows, surroundings, &scans, &mut self.movers);
             let odometry = pose.odometry();
             let held = self.belief.surroundings.as_ref();
             self.movers.place(&pose, held.map_or(odometry, |held| held.carried(odometry)));
@@ -393,12 +393,14 @@ impl Mapper {
         contact: Option<&ContactSample>,
     ) -> Window {
         assert_ne!(self.belief.tick, Some(pose.stamp.tick), "a tick counts once");
-        let (belief, robot) = (&mut self.belief, pose.pose());
+        let belief = &mut self.belief;
+        let robot = pose.pose();
         let before_m = belief.rolled;
         belief.tick = Some(pose.stamp.tick);
         belief.rolled += belief.robot.distance(robot.position)
             + self.half_track * (robot.heading - belief.heading).abs();
-        (belief.robot, belief.heading) = (robot.position, robot.heading);
+        belief.robot = robot.position;
+        belief.heading = robot.heading;
         let (ranges, scans) =
             if self.mission.sensing { (ranges, scans) } else { (&[][..], &[][..]) };
         let (seen, is_event) = match &mut belief.sensed {
@@ -410,7 +412,8 @@ impl Mapper {
                 (seen, seen.area() > 0)
             }
             Sensed::Evidence(map) => {
-                let (rows, rolled_m) = (&self.rows, [before_m, belief.rolled]);
+                let rows = &self.rows;
+                let rolled_m = [before_m, belief.rolled];
                 let fans = scans.iter().filter_map(|Placed { row, robot, beams, .. }| {
                     Some((*row, rows.scan(*row, robot.pose(), beams)?))
                 });
@@ -507,13 +510,15 @@ impl Mapper {
     }
 
     fn falsify(&mut self) -> Window {
-        let (frame, target) = (self.frame, self.target);
+        let frame = self.frame;
+        let target = self.target;
         let Belief { cells, fault, robot, target: place, .. } = &mut self.belief;
         if *fault == FaultKind::Nothing {
             return Window::default();
         }
         paint(cells, &frame, frame.whole(), |cell, held| {
-            let (stays, at) = (Some(cell) == target || held.is_hazard(), frame.centre_of(cell));
+            let stays = Some(cell) == target || held.is_hazard();
+            let at = frame.centre_of(cell);
             let covered = !stays && fault::covers(*fault, at, frame.resolution_m, *robot, *place);
             if covered { CellState::Sensed } else { held }
         })

@@ -32,7 +32,8 @@ impl Index {
         };
         let origin = corner(DVec2::min) - CELL_M;
         let cells = ((corner(DVec2::max) - origin) / CELL_M).floor() + 2.0;
-        let (width, height) = (cells.x as usize, cells.y as usize);
+        let width = cells.x as usize;
+        let height = cells.y as usize;
         let mut index =
             Self { origin, width, before: vec![0; width * height + 1], surfaces: Vec::new() };
         let mut order: Vec<_> =
@@ -70,14 +71,16 @@ impl Index {
         if left > right {
             return None;
         }
-        let (mut nearest, mut square) = (None, gate * gate);
+        let mut nearest = None;
+        let mut square = gate * gate;
         for row in bottom..=top {
             let row = row * self.width;
             let found = self.before[row + left] as usize..self.before[row + right + 1] as usize;
             for number in &self.surfaces[found] {
                 let other = surfaces[*number as usize].at.distance_squared(at);
                 if other <= square {
-                    (nearest, square) = (Some(*number as usize), other);
+                    nearest = Some(*number as usize);
+                    square = other;
                 }
             }
         }

@@ -96,7 +96,8 @@ impl Ros2 {
         let Some(((content, topic), payload)) = piece.split_first().and_then(row_of) else {
             return Err("the message belongs to an unknown topic".to_owned());
         };
-        let (content, name) = (*content, topic.name.clone());
+        let content = *content;
+        let name = topic.name.clone();
         self.take_payload(content, payload, heard).map_err(|why| format!("{name}: {why}"))?;
         // Other nodes' commands do not show the robot's presence.
         heard.anything |= content != Content::Command;
@@ -197,7 +198,8 @@ impl Ros2 {
         let Some(sensor) = self.table.get(row) else {
             return Ok(());
         };
-        let (beams, most_s) = (scan.ranges.len(), LONGEST_SWEEP_NS as f64 / 1e9);
+        let beams = scan.ranges.len();
+        let most_s = LONGEST_SWEEP_NS as f64 / 1e9;
         let beam_s = f64::from(scan.beam_s);
         if !(0.0..=most_s).contains(&(beam_s * beams as f64)) {
             return Err(format!("time_increment is {beam_s}; give seconds, or 0"));
@@ -237,7 +239,8 @@ impl Ros2 {
 const STAMPS_NS: std::ops::RangeInclusive<i64> = -LONGEST_SWEEP_NS..=AHEAD_NS;
 
 fn sweep_of(scan: &Scan, sensor: &Sensor) -> Sweep {
-    let ((first, step), (its_first, its_step)) = (scan.fan, sensor.fan());
+    let (first, step) = scan.fan;
+    let (its_first, its_step) = sensor.fan();
     let along = if scan.is_reversed { -1.0 } else { 1.0 };
     let beam_ns = (along * f64::from(scan.beam_s) * 1e9 * its_step / step).round();
     if beam_ns == 0.0 || !beam_ns.is_finite() {
@@ -254,7 +257,8 @@ fn sweep_of(scan: &Scan, sensor: &Sensor) -> Sweep {
 }
 
 fn is_same_fan(scan: &Scan, sensor: &Sensor) -> bool {
-    let ((first, step), (its_first, its_step)) = (scan.fan, sensor.fan());
+    let (first, step) = scan.fan;
+    let (its_first, its_step) = sensor.fan();
     scan.ranges.len() == sensor.beams
         && (first - its_first).abs() <= SAME_BEARING * its_step
         && (step - its_step).abs() <= SAME_STEP * its_step
@@ -271,7 +275,8 @@ fn is_whole(sensor: &Sensor, scan: &Scan) -> bool {
 /// Maps a circle's beams to the nearest of the row. The shortest of several counts; others have no
 /// reading.
 fn turned_to(sensor: &Sensor, fan: (f64, f64), came: impl Iterator<Item = f32>) -> Vec<f32> {
-    let ((first, step), (its_first, its_step)) = (fan, sensor.fan());
+    let (first, step) = fan;
+    let (its_first, its_step) = sensor.fan();
     let mut beams = vec![f32::NAN; sensor.beams];
     for (number, range) in came.enumerate() {
         let from_first = (first + number as f64 * step - its_first) / its_step;
@@ -285,7 +290,8 @@ fn turned_to(sensor: &Sensor, fan: (f64, f64), came: impl Iterator<Item = f32>) 
 
 fn other_fan(scan: &Scan, sensor: &Sensor) -> String {
     let fan = |(first, step): (f64, f64), beams| {
-        let (first, step) = (first.to_degrees(), step.to_degrees());
+        let first = first.to_degrees();
+        let step = step.to_degrees();
         format!("{beams} beams from {first:.1} degrees in steps of {step:.3}")
     };
     format!(

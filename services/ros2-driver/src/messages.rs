@@ -37,7 +37,8 @@ impl Odometry {
         let heading = pose.pose.orientation.heading();
         let heading =
             heading.ok_or("the orientation is not a rotation; set pose.pose.orientation")?;
-        let ([x, y], twist) = (pose.pose.at(), [twist.twist.linear.x, twist.twist.angular.z]);
+        let [x, y] = pose.pose.at();
+        let twist = [twist.twist.linear.x, twist.twist.angular.z];
         if !twist.iter().all(|speed| speed.is_finite()) {
             return Err("a speed is not finite; set twist.twist".to_owned());
         }

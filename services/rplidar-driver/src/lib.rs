@@ -125,7 +125,8 @@ impl Driver for Rplidar {
     }
 
     fn reset(&mut self) {
-        (self.decoder, self.turn) = (Decoder::default(), None);
+        self.decoder = Decoder::default();
+        self.turn = None;
     }
 
     fn tally(&self) -> WireTally {

@@ -46,7 +46,9 @@ impl Driver for X80 {
     fn hear(&mut self, bytes: &[u8]) -> Heard {
         self.decoder.push(bytes);
         let mut heard = Heard::default();
-        let (mut motor, mut standard, mut custom) = (None, None, None);
+        let mut motor = None;
+        let mut standard = None;
+        let mut custom = None;
         while let Some(frame) = self.decoder.next_frame() {
             match Report::parse(&frame) {
                 Ok(Report::Standard(sensors)) => standard = Some(sensors),

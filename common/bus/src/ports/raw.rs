@@ -257,7 +257,8 @@ pub(crate) fn opened_by(medium: &Medium, spec: &Spec, carried: &Carried) -> Resu
     };
     let service = SharedService::open(node, spec, carried)?;
     let event = event(node, spec)?;
-    let (mut writers, mut woken) = (BTreeSet::new(), BTreeSet::new());
+    let mut writers = BTreeSet::new();
+    let mut woken = BTreeSet::new();
     service.dynamic_config().list_publishers(|writer| {
         writers.insert(process_of(writer.publisher_id.value()));
         CallbackProgression::Continue

@@ -53,7 +53,8 @@ pub(super) fn check(mission: &Mission) -> Result {
         ("robot.top_speed_m_s", body.top_speed_m_s, 0.01..=10.0, "m/s"),
     ])?;
     response(robot.response)?;
-    let (limits, limit_s) = (robot.low_battery_v, robot.command_limit_s);
+    let limits = robot.low_battery_v;
+    let limit_s = robot.command_limit_s;
     all_within([
         ("robot.command_limit_s", limit_s, 0.02..=5.0, "s"),
         ("robot.low_battery_v", limits.board, 0.0..=MOTOR_SCALE_V, "V"),
@@ -74,7 +75,8 @@ pub(super) fn check(mission: &Mission) -> Result {
         "only the protocols json and arduino report a gyro through this key",
         "set robot.ros2.imu for a ROS 2 robot, or remove it",
     )?;
-    let (left, right) = (robot.left.channel, robot.right.channel);
+    let left = robot.left.channel;
+    let right = robot.right.channel;
     refuse_if(
         left > 1 || right > 1 || left == right,
         "robot.left",

@@ -35,7 +35,8 @@ pub(super) fn check(mission: &Mission) -> Result {
         refuse_if(is_shared, KEY, problem, "give each its own channel")?;
     }
     let written = |kind| rows.iter().filter(|row| row.kind == kind).count();
-    let (sonars, rays) = (written(SensorKind::Cone), written(SensorKind::Ray));
+    let sonars = written(SensorKind::Cone);
+    let rays = written(SensorKind::Ray);
     refuse_if(
         is_simulated && (sonars > SONARS || rays > INFRARED_RANGERS),
         KEY,
@@ -147,7 +148,8 @@ fn wire(mission: &Mission) -> Result {
     )?;
     for row in &mission.robot.sensors {
         let own = rplidars.iter().find(|(_, sensor, _)| sensor.name == row.name);
-        let (name, has_address) = (&row.name, row.address.is_some());
+        let name = &row.name;
+        let has_address = row.address.is_some();
         refuse_if(
             has_address && own.is_none(),
             KEY,

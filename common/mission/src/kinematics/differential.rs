@@ -17,16 +17,18 @@ impl DifferentialDrive {
     /// Maps omega_L and omega_R, rad/s, by (2). The map is linear, so wheel angles give (arc,
     /// turn).
     pub fn twist(&self, [left, right]: [f64; 2]) -> Twist {
-        let (half, over) = (self.radius / 2.0, self.radius / self.track);
+        let half = self.radius / 2.0;
+        let over = self.radius / self.track;
         Twist { v: half * right + half * left, omega: over * right - over * left }
     }
 
     /// Inverts the map by (17) to omega_L and omega_R, rad/s. If a wheel would exceed its limit,
     /// one factor scales both, which keeps the curvature.
     pub fn wheels(&self, twist: Twist) -> [f64; 2] {
-        let (rim, turn) =
-            (1.0 / self.radius * twist.v, self.track / (2.0 * self.radius) * twist.omega);
-        let (right, left) = (rim + turn, rim - turn);
+        let rim = 1.0 / self.radius * twist.v;
+        let turn = self.track / (2.0 * self.radius) * twist.omega;
+        let right = rim + turn;
+        let left = rim - turn;
         let fastest = right.abs().max(left.abs());
         let scale =
             if fastest > self.top_wheel_speed { self.top_wheel_speed / fastest } else { 1.0 };

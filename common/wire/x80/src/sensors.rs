@@ -78,7 +78,8 @@ pub(super) trait Layout: Default {
 
     /// Ignores further bytes.
     fn from_bytes(data: &[u8]) -> Option<Self> {
-        let (mut new, mut bytes) = (Self::default(), data.get(..Self::BYTES)?.iter());
+        let mut new = Self::default();
+        let mut bytes = data.get(..Self::BYTES)?.iter();
         new.each_byte(&mut |byte| *byte = bytes.next().copied().unwrap_or_default());
         Some(new)
     }

@@ -103,7 +103,8 @@ impl Monitor for BaseResponse {
                 let is_slower = is_longer(self.stops_within_m(response), stated_m);
                 if is_slower || !self.is_stated {
                     self.found = Some(response);
-                    (self.told_from, self.is_followed) = (now.time, !is_slower);
+                    self.told_from = now.time;
+                    self.is_followed = !is_slower;
                 }
             }
             Observation::Command(command) => {

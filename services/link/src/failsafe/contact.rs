@@ -82,7 +82,8 @@ impl Contacts {
     }
 
     pub(super) const fn reset(&mut self) {
-        (self.held, self.new) = (None, None);
+        self.held = None;
+        self.new = None;
     }
 
     pub(super) fn condition(&self, now: MissionTime) -> Condition {

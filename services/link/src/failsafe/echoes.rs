@@ -75,8 +75,7 @@ impl Listener {
     pub(super) fn at(sensor: &Sensor, robot: Pose2) -> Self {
         let half_rad = sensor.field_of_view_deg.to_radians() / 2.0;
         let [inner, outer] = [INNER, OUTER].map(|share| (share * half_rad).cos());
-        let (from, reach_m) = (sensor.mount.on(robot), sensor.reach_m);
-        Self { from, half_rad, inner, outer, reach_m }
+        Self { from: sensor.mount.on(robot), half_rad, inner, outer, reach_m: sensor.reach_m }
     }
 
     fn echo(&self, range_m: f64, at_s: f64) -> Echo {
@@ -127,7 +126,8 @@ impl Echoes {
         match shares.max_by(|(one, _), (other, _)| one.total_cmp(other)) {
             Some((share, echo)) if share > LIKELY[0] => {
                 echo.weigh(UNFIT, fitting(echo).map(|fits| !fits));
-                (echo.from, echo.at_s) = (listener.from.position, at_s);
+                echo.from = listener.from.position;
+                echo.at_s = at_s;
                 echo.readings += 1;
             }
             _ => {

@@ -142,7 +142,8 @@ impl Hearing {
         let is_silent = readings.iter().all(|it| it.status() != RangeStatus::Measured);
         for reading in readings {
             let Some(sensor) = self.sensors.get(&reading.sensor) else { continue };
-            let (status, frame) = (reading.status(), &mut memory.frame);
+            let status = reading.status();
+            let frame = &mut memory.frame;
             frame.answers |= status != RangeStatus::Invalid;
             if status == RangeStatus::Measured {
                 frame.hears = true;
@@ -210,7 +211,8 @@ impl Hearing {
             memory.mean_ends += (frame.ends - memory.mean_ends) / MEAN_OF;
             assert!(memory.mean_ends >= 0.0);
             memory.ends.sum = 0.0;
-            (memory.frames, memory.way_m) = (0, 0.0);
+            memory.frames = 0;
+            memory.way_m = 0.0;
         } else if frame.answers {
             memory.frames += 1;
             memory.way_m += way_m.abs();
@@ -232,7 +234,8 @@ impl Hearing {
     /// Explains doubtful, or surely deaf, sensors.
     pub(super) fn judged(&self, sure: bool) -> Option<String> {
         let check = "is gone, or the sonar is deaf; check its supply and cable, then run `firsthand stop` and `resume`";
-        let (it, memory) = (usize::from(sure), &self.memory);
+        let it = usize::from(sure);
+        let memory = &self.memory;
         let name = |row: &u8| self.sensors.get(row).map_or("", |sensor| &*sensor.name);
         if let Some(rows) = self.front.filter(|_| sure && memory.silences > SILENCES) {
             let [front, left, right] = rows.each_ref().map(name);

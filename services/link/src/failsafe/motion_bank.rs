@@ -109,7 +109,8 @@ impl Poses {
         let after = self.0.partition_point(|(then, _)| *then < at_s);
         let before = after.saturating_sub(1);
         let kept = |it: usize| self.0.get(it).or(self.0.back()).copied().unwrap_or_default();
-        let ((from_s, from), (to_s, to)) = (kept(before), kept(after));
+        let (from_s, from) = kept(before);
+        let (to_s, to) = kept(after);
         let share = if to_s > from_s { (at_s - from_s) / (to_s - from_s) } else { 0.0 };
         let share = share.clamp(0.0, 1.0);
         Pose2 {
@@ -144,7 +145,8 @@ impl<const N: usize> Bank<N> {
         let sum = &mut self.sums[hypothesis];
         *sum += better;
         if *sum <= 0.0 {
-            (*sum, self.since_s[hypothesis]) = (0.0, at_s);
+            *sum = 0.0;
+            self.since_s[hypothesis] = at_s;
         }
     }
 

@@ -218,7 +218,8 @@ impl Odometry {
         }
         self.commanded = Some(now);
         let told = counts.map(f64::from);
-        let (reached, told) = (channels(self.ask(told, now)), channels(told));
+        let reached = channels(self.ask(told, now));
+        let told = channels(told);
         // A base may stop sooner than its response states.
         let [left, right, turn] = [0, 1, 2].map(|of| {
             let most = told[of].abs();
@@ -242,7 +243,8 @@ impl Odometry {
 
     fn adopt(&mut self, response: Response) {
         assert!(response.dead_time_s() >= 0.0 && response.acceleration_m_s2 > 0.0);
-        (self.response, self.found) = (response, Some(response));
+        self.response = response;
+        self.found = Some(response);
         self.reached = ModelledWheels::new(self.axle, 0.0, &response);
         self.shares.adopt(response);
     }
@@ -424,7 +426,8 @@ impl Odometry {
     fn restart_evidence(&mut self, now: MissionTime) {
         for evidence in &mut self.evidence {
             evidence.since = now;
-            (evidence.still_s, evidence.held_s) = (0.0, 0.0);
+            evidence.still_s = 0.0;
+            evidence.held_s = 0.0;
         }
     }
 }

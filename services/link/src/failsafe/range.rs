@@ -138,9 +138,9 @@ impl Row {
         if is_judged {
             let follows = |[range, way, turned]: Value| {
                 let went_m = (way_m - way).abs();
-                let (nearer, farther) = (went_m, if self.looks_ahead { 0.0 } else { went_m });
+                let farther = if self.looks_ahead { 0.0 } else { went_m };
                 let is_near =
-                    (-nearer - FOLLOWS_M..=farther + FOLLOWS_M).contains(&(range_m - range));
+                    (-went_m - FOLLOWS_M..=farther + FOLLOWS_M).contains(&(range_m - range));
                 ((heading - turned).abs() < FOLLOWS_RAD).then_some(is_near)
             };
             let follow = past.newest.into_iter().flatten().filter_map(follows);
@@ -245,7 +245,8 @@ impl Range {
 
     /// Returns the travel of the left and the right wheel that the wheels do not count, metres.
     pub(crate) fn untold_m(&self) -> [f64; 2] {
-        let ([along, turn], half_track_m) = (self.untold, self.body.track_m / 2.0);
+        let [along, turn] = self.untold;
+        let half_track_m = self.body.track_m / 2.0;
         [along - turn * half_track_m, along + turn * half_track_m]
     }
 
@@ -264,9 +265,11 @@ impl Range {
     }
 
     fn forget(&mut self) {
-        (self.counts, self.poses) = (None, Poses::default());
+        self.counts = None;
+        self.poses = Poses::default();
         for row in &mut self.rows {
-            (row.past, row.implausible) = (Past::default(), [None; 2]);
+            row.past = Past::default();
+            row.implausible = [None; 2];
         }
         self.scans.iter_mut().for_each(ScanMotion::reset);
         self.hearing.reset();

@@ -137,7 +137,8 @@ impl RangeMotion {
         if passed_s < APART_S[0] || moved == [false; ALL.len()] {
             return;
         }
-        (self.latest, self.newest_s) = (robots, at_s);
+        self.latest = robots;
+        self.newest_s = at_s;
         self.motion_s += passed_s;
         assert!((APART_S[0]..=APART_S[1]).contains(&passed_s));
         let now_s = self.motion_s;
@@ -159,14 +160,16 @@ impl RangeMotion {
             let half_rad = sensor.field_of_view_deg.to_radians() / 2.0;
             let least_cos = (2.0 * HEARD * half_rad).cos();
             let off_m = |delay: usize, other: DVec2| {
-                let (way, axis) = (other - from[delay].position, from[delay].axis());
+                let way = other - from[delay].position;
+                let axis = from[delay].axis();
                 match sensor.kind {
                     SensorKind::Cone if way.dot(axis) < least_cos * way.length() => NEW_M,
                     SensorKind::Cone => (way.length() - range_m).abs(),
                     _ => under[delay].distance(other),
                 }
             };
-            let (mut prompt_m, mut least_m) = (NEW_M, [NEW_M; ALL.len()]);
+            let mut prompt_m = NEW_M;
+            let mut least_m = [NEW_M; ALL.len()];
             for (_, other) in self.hits.range(..older) {
                 for (delay, least_m) in least_m.iter_mut().enumerate() {
                     *least_m = least_m.min(off_m(delay, other.under[delay]));

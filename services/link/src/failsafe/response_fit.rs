@@ -186,7 +186,8 @@ impl ResponseFit {
         let fit = |later_s: f64| {
             let dead_time_s = stated.dead_time_s() + later_s;
             let [_, channels] = self.motions(dead_time_s, limits, courses.each_ref(), *from_s);
-            let ((wheels, factor), turn) = (self.of_wheels(&channels), &channels[TURN]);
+            let (wheels, factor) = self.of_wheels(&channels);
+            let turn = &channels[TURN];
             let unlike = wheels.unlike(factor);
             let turns = turn.both * turn.both.abs() >= TURN_EXPLAINED * turn.model * turn.turned;
             let explains =
@@ -210,7 +211,8 @@ impl ResponseFit {
     /// Returns the responses that explain the motion about as well as the best one, unless
     /// `believed` fits nearly as well.
     pub(super) fn alike(&self, believed: Option<Response>, top_speed_m_s: f64) -> Option<Alike> {
-        let ((first_s, _), (last_s, _)) = (self.turned.front()?, self.turned.back()?);
+        let (first_s, _) = self.turned.front()?;
+        let (last_s, _) = self.turned.back()?;
         let intervals = self.turned.iter().filter(|(_, turned)| turned.is_some()).count();
         let scale = self.scale(intervals, last_s - first_s);
         // Unexplained motion, all motion, and the factor.
@@ -331,7 +333,8 @@ impl ResponseFit {
 
     /// Returns an axis' course without dead time.
     fn course(&self, limits: Limits, axis: usize) -> Course {
-        let (mut way, mut speed) = (0.0, 0.0);
+        let mut way = 0.0;
+        let mut speed = 0.0;
         let mut course = Vec::with_capacity(2 * self.commands.len());
         let ends = self.commands.iter().skip(1).map(|(at, _)| *at).chain([f64::INFINITY]);
         for (&(at, told), end) in self.commands.iter().zip(ends).filter(|((at, _), end)| at < end) {

@@ -104,7 +104,8 @@ impl RestartWatch {
         // The longer ago the last counts, the more would follow them.
         let most = if following.is_some() { SURELY_FOLLOWS } else { IMPLAUSIBLE };
         if share <= most {
-            (self.last, self.suspected) = (Some(frame), None);
+            self.last = Some(frame);
+            self.suspected = None;
             let (turned, gap_s) = since(before, frame);
             let gap_s = gap_s.max(self.jitter_s);
             self.turned = [speeds, turned.map(|turned| turned / gap_s)];
@@ -124,7 +125,8 @@ impl RestartWatch {
     }
 
     fn begin_at(&mut self, frame: Frame) {
-        (self.last, self.suspected) = (Some(frame), None);
+        self.last = Some(frame);
+        self.suspected = None;
         self.restarts += 1;
     }
 

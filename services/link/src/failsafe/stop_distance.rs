@@ -16,7 +16,8 @@ pub struct Stop {
 
 impl Stop {
     pub fn known_after(known_s: f64, mission: &Mission) -> Self {
-        let (response, speed) = (mission.trusted_response(), mission.speed_m_s());
+        let response = mission.trusted_response();
+        let speed = mission.speed_m_s();
         assert!(known_s >= 0.0 && speed >= 0.0);
         let turns_s = mission.turn_rad_s() / response.turn_acceleration_rad_s2;
         let brakes_s = turns_s.max(speed / response.acceleration_m_s2);

@@ -39,7 +39,8 @@ impl Touches {
             };
             let before = std::mem::replace(felt, feels);
             if feels && !before && self.moves && !self.stands(now) {
-                (self.newest, self.is_told) = (Some((row, now)), false);
+                self.newest = Some((row, now));
+                self.is_told = false;
             }
         }
     }

@@ -68,7 +68,8 @@ impl Sums {
         if left == 0.0 || right == 0.0 || !turns(0) || !turns(1) {
             return;
         }
-        let (x, y) = (counted[0] * right / way_m, counted[1] * left / way_m);
+        let x = counted[0] * right / way_m;
+        let y = counted[1] * left / way_m;
         let left = LEFT_AFTER_A_METRE.powf(way_m);
         self.way_m = self.way_m * left + way_m;
         assert!(way_m > 0.0 && left < 1.0);
@@ -226,11 +227,12 @@ impl WheelShares {
             && now_s - then_s <= self.longest_gap_s
         {
             let metres = |counts: [f64; 2]| counts.map(|count| count / self.axle.counts_per_m);
-            let (told, rolled) = (metres(told), metres(counts.since(before)));
+            let told = metres(told);
+            let rolled = metres(counts.since(before));
             self.untold.take([told, rolled]);
             // Travel during speed changes depends on timing, which the model knows less well.
-            let (left, speeds) =
-                (wheels.each(ModelledSpeed::left), wheels.each(ModelledSpeed::speed));
+            let left = wheels.each(ModelledSpeed::left);
+            let speeds = wheels.each(ModelledSpeed::speed);
             let settles = |wheel: usize| left[wheel].abs() <= SETTLED * speeds[wheel].abs();
             let told = if settles(0) && settles(1) { told } else { [0.0; 2] };
             self.newest.rotate_left(1);

@@ -59,7 +59,8 @@ impl Dds {
     }
 
     fn take(&self, row: usize) -> Option<Message> {
-        let (reader, own) = (self.readers.get(row)?, self.writer.gid());
+        let reader = self.readers.get(row)?;
+        let own = self.writer.gid();
         std::iter::from_fn(|| reader.take()).find(|message| message.from != own)
     }
 }
@@ -77,7 +78,8 @@ impl Wire for Dds {
             tracing::info!("the ROS domain is silent; the link joins it again");
             self.participant.rejoin()?;
             (self.readers, self.writer) = endpoints(&self.participant, &self.topics)?;
-            (self.joined_ns, self.heard_ns) = (Some(now_ns), None);
+            self.joined_ns = Some(now_ns);
+            self.heard_ns = None;
         }
         Ok(())
     }

@@ -144,7 +144,8 @@ impl<D: Dial> Wire for Stream<D> {
         if !connection.is_open && poll::is_writable(&connection.descriptor, Duration::ZERO)? {
             match self.dial.finish(&connection.descriptor) {
                 Ok(()) => {
-                    (connection.is_open, connection.since_ns) = (true, now_ns);
+                    connection.is_open = true;
+                    connection.since_ns = now_ns;
                     connection.opened_ns = now_ns;
                     self.watch(EventFlags::IN)?;
                     tracing::info!(robot = %self.robot, "the wire is open");
