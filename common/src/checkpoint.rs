@@ -75,8 +75,10 @@ impl Checkpoint {
         &self,
         slot: u64,
     ) -> Result<Option<(u64, T)>, CheckpointError> {
-        let bytes = self.file.read(self.slot_offset(slot), (HEADER + self.capacity) as u64);
-        let bytes = bytes.map_err(FileError::of("read checkpoint", &self.path))?;
+        let bytes = self
+            .file
+            .read(self.slot_offset(slot), (HEADER + self.capacity) as u64)
+            .map_err(FileError::of("read checkpoint", &self.path))?;
         decode(&bytes)
             .map_err(|problem| CheckpointError::Foreign { file: self.path.clone(), problem })
     }

@@ -142,8 +142,7 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
         let Some(joined) = &mut self.joined else {
             return Ok(None);
         };
-        let opened = (self.open)(&joined.bus)?;
-        Ok(Some(std::mem::replace(&mut joined.topics, opened)))
+        Ok(Some(std::mem::replace(&mut joined.topics, (self.open)(&joined.bus)?)))
     }
 
     fn look(&mut self) -> Result<bool, BusError> {

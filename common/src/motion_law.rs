@@ -141,8 +141,7 @@ impl MotionLaw {
         let angle = alignment.angle();
         let least = LEAST_TURN_RAD_S.min(self.look);
         let most = self.look.min(self.response.turn_to_stop_within(|| angle)).max(least);
-        let omega = self.side(alignment, side) * (TURN_GAIN * angle).clamp(least, most);
-        Twist { v: 0.0, omega }
+        Twist { v: 0.0, omega: self.side(alignment, side) * (TURN_GAIN * angle).clamp(least, most) }
     }
 
     /// Returns the share of vd by (16). The slowdown at the target multiplies it; as a separate

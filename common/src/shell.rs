@@ -333,8 +333,8 @@ impl Host {
         let mut heartbeat = Heartbeat::new(&bus, &generation, run.clock)?;
         let roster = Roster::open(&bus)?;
         heartbeat.beat(HealthState::Starting, Progress::default())?;
-        let saved = Saved::default();
-        let context = Context { generation, run, bus, waiter, saved, wiring: P::WIRING };
+        let context =
+            Context { generation, run, bus, waiter, saved: Saved::default(), wiring: P::WIRING };
         Ok((Self { context, heartbeat }, roster))
     }
 

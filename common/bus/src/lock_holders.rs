@@ -25,8 +25,7 @@ pub fn holders(file: &File) -> io::Result<Vec<u32>> {
 }
 
 pub(crate) fn has_open(pid: u32, file: &File) -> bool {
-    let opened = file.metadata().and_then(|file| Ok(descriptors(pid, &file)?.next().is_some()));
-    opened.unwrap_or(false)
+    file.metadata().and_then(|file| Ok(descriptors(pid, &file)?.next().is_some())).unwrap_or(false)
 }
 
 fn descriptors(pid: u32, file: &Metadata) -> io::Result<impl Iterator<Item = PathBuf>> {

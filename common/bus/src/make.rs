@@ -145,8 +145,11 @@ impl Bus {
     /// Joins as a stage of the process `supervisor`, like [`Bus::join`]. It ignores unnamed
     /// processes and may take the places that consumers leave free.
     pub fn join_as_stage(domain: &Domain, name: &str, supervisor: u32) -> Result<Self> {
-        let writers = Some(Writers::of(supervisor));
-        Ok(Self { writers, is_stage: true, ..Self::join(domain, name)? })
+        Ok(Self {
+            writers: Some(Writers::of(supervisor)),
+            is_stage: true,
+            ..Self::join(domain, name)?
+        })
     }
 
     fn join_instance(instance: BusInstance, name: &str) -> Result<Self> {

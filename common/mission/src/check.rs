@@ -86,8 +86,7 @@ impl Mission {
             mission.name = origin.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         }
         mission.remarks = remarks(text, origin, tree.get_ref(), &mission);
-        let checked = Checker::default().run(&mission);
-        checked.map_err(|Objection { key, problem, remedy }| {
+        Checker::default().run(&mission).map_err(|Objection { key, problem, remedy }| {
             refused(span_of(tree.get_ref(), key), key.to_owned(), problem, remedy)
         })?;
         assert!(mission.target.is_finite() && mission.contains(mission.start.at));
@@ -216,8 +215,7 @@ fn dropped_of(
 }
 
 fn line_of(text: &str, offset: usize) -> usize {
-    let upto = &text.as_bytes()[..offset.min(text.len())];
-    1 + upto.iter().filter(|&&byte| byte == b'\n').count()
+    1 + text.bytes().take(offset).filter(|&byte| byte == b'\n').count()
 }
 
 /// Returns the offset of the deepest existing part of the dotted `key`; a default has no line.

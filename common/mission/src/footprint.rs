@@ -97,8 +97,7 @@ impl Footprint {
     /// Returns the distance from the body to `point` in its frame, metres (negative inside), and
     /// the unit direction.
     pub fn gap_to_point(&self, point: DVec2) -> (f64, DVec2) {
-        let sides = self.sides().map(|(from, out)| (out.dot(point - from), out));
-        let inside = greatest(sides);
+        let inside = greatest(self.sides().map(|(from, out)| (out.dot(point - from), out)));
         if inside.0 <= 0.0 {
             return inside;
         }
@@ -132,13 +131,11 @@ impl Footprint {
 }
 
 fn greatest(gaps: impl Iterator<Item = (f64, DVec2)>) -> (f64, DVec2) {
-    let none = (f64::NEG_INFINITY, DVec2::X);
-    gaps.fold(none, |best, gap| if gap.0 > best.0 { gap } else { best })
+    gaps.fold((f64::NEG_INFINITY, DVec2::X), |best, gap| if gap.0 > best.0 { gap } else { best })
 }
 
 fn least(pairs: impl Iterator<Item = (DVec2, DVec2)>) -> (f64, DVec2) {
-    let none = (f64::INFINITY, DVec2::X);
-    pairs.fold(none, |best, (body, thing)| {
+    pairs.fold((f64::INFINITY, DVec2::X), |best, (body, thing)| {
         let distance = body.distance(thing);
         if distance < best.0 { (distance, (thing - body).normalize_or(DVec2::X)) } else { best }
     })

@@ -64,8 +64,7 @@ impl Lead {
         self.go_on(pose, now_s);
         self.begin(pose, now_s);
         let mut ahead = self.clone();
-        let pose = ahead.go_on(pose, now_s + self.dead_time_s);
-        (pose, ahead.twist)
+        (ahead.go_on(pose, now_s + self.dead_time_s), ahead.twist)
     }
 
     /// Estimates the initial motion, because the robot may be moving when the model begins.

@@ -348,8 +348,7 @@ impl Mission {
     /// Returns the outline to keep clear where the covering circle does not fit. Only robots with a
     /// laser that look first have one.
     pub fn outline(&self) -> Option<Footprint> {
-        let checks = self.looks_first() && self.used(SensorKind::Scan) > 0;
-        self.body().footprint.filter(|_| checks)
+        self.body().footprint.filter(|_| self.looks_first() && self.used(SensorKind::Scan) > 0)
     }
 
     /// Returns vd: `controller.speed_m_s`, capped at [`Mission::sight_speed_m_s`].

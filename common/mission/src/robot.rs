@@ -221,8 +221,7 @@ impl Body {
         let omega = grown(now.omega, then.omega, acceleration[1]);
         // Slowing down to keep the curve needs no limit.
         let turned = if omega == now.omega { 1.0 } else { (omega / now.omega).abs() };
-        let v = grown(now.v * turned, then.v, acceleration[0]);
-        drive.wheels(Twist { v, omega })
+        drive.wheels(Twist { v: grown(now.v * turned, then.v, acceleration[0]), omega })
     }
 
     pub fn ackermann(&self) -> Option<Ackermann> {

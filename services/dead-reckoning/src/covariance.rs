@@ -112,8 +112,7 @@ impl ErrorModel {
                 effect(0.5, -1.0 / self.track_m) * slip(left),
                 effect(0.5, 1.0 / self.track_m) * slip(right),
             ];
-            let ratio = effect(0.5 * turn * half_track, arc / self.track_m);
-            (ratio, effect(0.0, -turn), slips)
+            (effect(0.5 * turn * half_track, arc / self.track_m), effect(0.0, -turn), slips)
         };
         carried.set_column(3, &(carried.column(3) + ratio));
         carried.set_column(4, &(carried.column(4) + track));

@@ -41,6 +41,5 @@ pub fn saved_place(
 }
 
 pub fn saved_state(directory: &Path) -> Result<Option<State>, CheckpointError> {
-    let file = run::checkpoint_file(directory, DeadReckoning::NAME);
-    Ok(Checkpoint::open(&file, STATE_BYTES)?.1)
+    Ok(Checkpoint::open(&run::checkpoint_file(directory, DeadReckoning::NAME), STATE_BYTES)?.1)
 }

@@ -69,8 +69,7 @@ impl Contradictions {
         let lever = estimate.pose.position - from;
         let pose =
             Pose2 { position: to + turned.rotate(lever), heading: estimate.pose.heading + turn };
-        let position = variance + heading * lever.length_squared();
-        Some(estimate.moved_to(pose, position, heading))
+        Some(estimate.moved_to(pose, variance + heading * lever.length_squared(), heading))
     }
 
     fn turned(&self, from: DVec2, to: DVec2, variance: f64) -> (f64, f64) {

@@ -110,8 +110,7 @@ impl Sensors {
 }
 
 fn absent(table: &[Sensor]) -> Vec<RangeReading> {
-    let rows = (0..).zip(table);
-    rows.map(|(sensor, _)| RangeReading { sensor, ..RangeReading::default() }).collect()
+    (0..).zip(table).map(|(sensor, _)| RangeReading { sensor, ..RangeReading::default() }).collect()
 }
 
 #[derive(Clone, Debug)]

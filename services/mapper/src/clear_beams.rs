@@ -37,8 +37,7 @@ impl ClearBeams {
         assert!(reading.echo.is_none_or(|range| range >= 0.0));
         let clear_m = reading.echo.map_or(f64::INFINITY, |range| range - AHEAD_OF_ECHO_M);
         let beam = clear_beam(reading.origin, reading.axis, clear_m.min(reading.sonar.clear_m));
-        let most = (OF_ONE_SONAR * sonars).min(CLEAR_BEAMS);
-        append(&mut self.beams, most, Dated { beam, rolled_m });
+        append(&mut self.beams, (OF_ONE_SONAR * sonars).min(CLEAR_BEAMS), Dated { beam, rolled_m });
     }
 
     pub(crate) fn take_ray(&mut self, ray: &Ray, rolled_m: f64) {

@@ -89,8 +89,10 @@ impl Poses {
         let turned = DVec2::from_angle(turn);
         let robot_at = |offset_ns: i64| {
             let Pose2 { position, heading } = self.at(time_ns(pose) + offset_ns)?;
-            let position = DVec2::new(x, y) + turned.rotate(position);
-            Some(Pose2 { position, heading: heading + turn })
+            Some(Pose2 {
+                position: DVec2::new(x, y) + turned.rotate(position),
+                heading: heading + turn,
+            })
         };
         let middle_ns = sweep.middle_ns(beams.len());
         // Before the first tick the robot stood; dead reckoning knows no earlier time.

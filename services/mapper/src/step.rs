@@ -363,8 +363,7 @@ impl Mapper {
             let held = self.belief.surroundings.as_ref();
             self.movers.place(&pose, held.map_or(odometry, |held| held.carried(odometry)));
             let forgot = self.forget(pose.stamp.time());
-            let mapped = self.map(&pose, (&ranges, &scans), contact.as_ref());
-            moved.union(forgot).union(mapped)
+            moved.union(forgot).union(self.map(&pose, (&ranges, &scans), contact.as_ref()))
         };
         self.belief.version += u64::from(changed.area() > 0);
         changed

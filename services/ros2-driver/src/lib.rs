@@ -229,8 +229,12 @@ impl Ros2 {
             ).into());
         }
         let sweep = if is_stated { sweep } else { Sweep::default() };
-        let stamp_ns = is_stated.then_some(scan.stamp_ns);
-        heard.scans.push(LaserScan { row, beams, sweep, stamp_ns });
+        heard.scans.push(LaserScan {
+            row,
+            beams,
+            sweep,
+            stamp_ns: is_stated.then_some(scan.stamp_ns),
+        });
         Ok(())
     }
 }

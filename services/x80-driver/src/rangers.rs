@@ -30,8 +30,8 @@ impl Rangers {
     ) -> Option<(InfraredSample, Vec<RangeReading>)> {
         let mut raw_ad = [self.first_infrared?; INFRARED_RANGERS];
         raw_ad[1..].copy_from_slice(&custom.ad[2..]);
-        let range_m = raw_ad.map(infrared_m);
-        let sample = InfraredSample { range_m, raw_ad, ..InfraredSample::default() };
+        let sample =
+            InfraredSample { range_m: raw_ad.map(infrared_m), raw_ad, ..InfraredSample::default() };
         Some((sample, self.readings(SensorKind::Ray, &raw_ad.map(seen))))
     }
 

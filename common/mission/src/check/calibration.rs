@@ -11,8 +11,8 @@ impl Mission {
     /// If the file cannot be read or is invalid.
     pub fn with_calibration(mut self) -> Result<Self, MissionError> {
         if let Some(file) = self.robot.calibration.take() {
-            let read = read_bounded(&file).map_err(|error| error.to_string());
-            self.robot.odometry = read
+            self.robot.odometry = read_bounded(&file)
+                .map_err(|error| error.to_string())
                 .and_then(|text| Calibration::parse(&text))
                 .map_err(|problem| MissionError::Calibration { file, problem })?;
         }

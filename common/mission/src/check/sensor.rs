@@ -111,8 +111,7 @@ fn row(row: &SensorRow, rate_hz: f64) -> Result {
     refuse_if(has_height && !is_scan, KEY, "height_m applies only to a laser", "remove it")?;
     if let Some(model) = row.model {
         let problem = format!("model {model:?} is not of kind {kind:?}");
-        let is_other = model.product().kind != *kind;
-        refuse_if(is_other, KEY, problem, "remove model, or change kind")?;
+        refuse_if(model.product().kind != *kind, KEY, problem, "remove model, or change kind")?;
     }
     let has_view = row.field_of_view_deg.is_some();
     let (reach, view, most) = match kind {
@@ -185,10 +184,11 @@ fn wire(mission: &Mission) -> Result {
 
 fn its_channel(row: &SensorRow) -> Result {
     let number = row.channel.ok_or_else(|| {
-        let problem =
-            format!("{:?} has no channel, and an X80 sends readings by channel", row.name);
-        let remedy = "give channel: 0 to 5 for a sonar, 0 to 6 for an infrared ranger";
-        objection(KEY, problem, remedy)
+        objection(
+            KEY,
+            format!("{:?} has no channel, and an X80 sends readings by channel", row.name),
+            "give channel: 0 to 5 for a sonar, 0 to 6 for an infrared ranger",
+        )
     })?;
     channel(KEY, row.kind, number)
 }

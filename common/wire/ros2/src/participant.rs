@@ -259,8 +259,7 @@ impl Reader {
         };
         let identity = SampleIdentity { writer_guid, sequence_number: message.sequence_number };
         let request = Request { identity, header: header.to_vec() };
-        let from = message.writer_guid.to_bytes();
-        Some(Message { payload: message.sample, from, request })
+        Some(Message { from: message.writer_guid.to_bytes(), payload: message.sample, request })
     }
 
     /// Yields the messages; endless while a writer floods the topic.

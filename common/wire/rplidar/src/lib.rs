@@ -246,6 +246,5 @@ impl Decoder {
 fn first_of_run(bytes: &[u8]) -> Option<Node> {
     let (nodes, _) = bytes.as_chunks();
     let nodes: Option<Vec<_>> = nodes.iter().map(|node| Node::parse(*node)).collect();
-    let nodes = nodes.filter(|nodes| nodes.windows(2).all(|pair| pair[1].follows(pair[0])))?;
-    nodes.first().copied()
+    nodes.filter(|nodes| nodes.windows(2).all(|pair| pair[1].follows(pair[0])))?.first().copied()
 }

@@ -73,8 +73,7 @@ impl Frame<'_> {
         let checked_from = out.len();
         out.extend_from_slice(&[self.rid, self.sn, self.did, data.len() as u8]);
         out.extend_from_slice(data);
-        let crc = crc8(&out[checked_from..]);
-        out.push(crc);
+        out.push(crc8(&out[checked_from..]));
         out.extend_from_slice(&END);
         assert_eq!(
             out.len() - checked_from,

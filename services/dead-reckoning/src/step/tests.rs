@@ -1,5 +1,5 @@
 use super::*;
-use common::samples::{Stamp, TurnSample};
+use common::samples::{FixSample, Stamp, TurnSample};
 use glam::DVec4;
 use std::f64::consts::PI;
 

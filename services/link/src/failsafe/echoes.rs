@@ -116,8 +116,7 @@ impl Echoes {
 
     pub(super) fn hear(&mut self, listener: Listener, range_m: f64, at_s: f64) {
         let is_before = |echo: &Echo| {
-            let nearer_m = range_m - SAME_M;
-            let must = echo.are(|place| listener.must_hear(place, echo.from, nearer_m));
+            let must = echo.are(|place| listener.must_hear(place, echo.from, range_m - SAME_M));
             echo.share(must) > LIKELY[1]
         };
         self.0.retain(|echo| !is_before(echo));

@@ -280,8 +280,10 @@ impl Range {
 impl Monitor for Range {
     fn new(mission: &Mission) -> Self {
         let front = mission.front_row();
-        let table = mission.sensor_table().into_iter().enumerate();
-        let (lasers, others): (Vec<_>, Vec<_>) = table
+        let (lasers, others): (Vec<_>, Vec<_>) = mission
+            .sensor_table()
+            .into_iter()
+            .enumerate()
             .filter(|(_, sensor)| sensor.used)
             .partition(|(_, sensor)| sensor.kind == SensorKind::Scan);
         Self {

@@ -47,8 +47,7 @@ impl Repeats {
     ) {
         let now = poses.at(at_s);
         let has_moved: [bool; LAGS] = std::array::from_fn(|lag| {
-            let then = poses.at(at_s - lag as f64 * STEP_S);
-            motion_m([then, now], M_PER_RAD) > MOVED_M
+            motion_m([poses.at(at_s - lag as f64 * STEP_S), now], M_PER_RAD) > MOVED_M
         });
         for (sensor, range_m) in readings {
             let past = self.past.entry(sensor).or_default();

@@ -11,8 +11,7 @@ impl Link {
     /// None if neither is pending.
     pub(crate) fn until_due(&self, now: MissionTime) -> Option<Duration> {
         let polls = self.polls_by_time().then(|| self.polls.until_next(now));
-        let repeat = self.repeat.map(|repeat| repeat.due.since(now));
-        polls.into_iter().chain(repeat).min()
+        polls.into_iter().chain(self.repeat.map(|repeat| repeat.due.since(now))).min()
     }
 
     /// Returns whether the robot drives, and keeps doing so without input until `then`.
