@@ -31,7 +31,7 @@ pub struct Odometry {
 }
 
 impl Odometry {
-    /// Reads odometry; the error says why there is none.
+    /// Reads odometry, or fails with the reason.
     pub fn read(payload: &[u8]) -> Result<Self, String> {
         let msg::Odometry { header, pose, twist, .. } = msg::Odometry::decode(payload)?;
         let heading = pose.pose.orientation.heading();
