@@ -61,7 +61,7 @@ pub use self::{
     error::RecordingError,
     file::now_ns,
     places::{files, next_place, parts},
-    reader::{End, Message, Recording},
+    reader::{End, Message, Recording, messages},
     recorder::{Options, Tape, record},
     viewers::log_line,
 };

@@ -59,6 +59,8 @@ pub struct Recording {
 #[derive(Debug)]
 pub struct Message {
     pub topic: Arc<str>,
+    /// Name of its schema; empty without one.
+    pub kind: Arc<str>,
     /// Mission time, as nanoseconds since 1970.
     pub log_ns: u64,
     /// Counted by its writer.
@@ -91,7 +93,7 @@ impl Recording {
                     about.get_or_insert(found.metadata);
                 }
                 Ok(Some(Record::Message { header, data })) => {
-                    let topic = records.topic(&header)?;
+                    let [topic, _] = records.topic(&header)?;
                     if &*topic == LOST {
                         lost = losses(&data).unwrap_or(lost);
                     }
@@ -157,15 +159,10 @@ impl Recording {
         &self,
         wanted: &[&str],
     ) -> Result<impl Iterator<Item = Result<Message>> + use<>> {
-        let mut records = Some(Records::open(&self.path)?);
         let wanted: Vec<_> = wanted.iter().map(|&topic| topic.to_owned()).collect();
-        Ok(iter::from_fn(move || {
-            let read = records.as_mut().map_or(Ok(None), |records| records.message(&wanted));
-            if !matches!(read, Ok(Some(_))) {
-                records = None;
-            }
-            read.transpose()
-        }))
+        messages(&self.path, move |topic, _| {
+            wanted.is_empty() || wanted.iter().any(|name| *name == *topic)
+        })
     }
 
     pub fn samples<P: Payload + Stamped + Layout>(
@@ -202,6 +199,22 @@ impl Recording {
     }
 }
 
+/// Returns the messages of any MCAP file whose topics and kinds are `wanted`, in file order up to a
+/// cut.
+pub fn messages<W: Fn(&str, &str) -> bool>(
+    path: &Path,
+    wanted: W,
+) -> Result<impl Iterator<Item = Result<Message>> + use<W>> {
+    let mut records = Some(Records::open(path)?);
+    Ok(iter::from_fn(move || {
+        let read = records.as_mut().map_or(Ok(None), |records| records.message(&wanted));
+        if !matches!(read, Ok(Some(_))) {
+            records = None;
+        }
+        read.transpose()
+    }))
+}
+
 fn losses(message: &[u8]) -> Option<BTreeMap<String, u64>> {
     let mut recorder: BTreeMap<String, _> = serde_json::from_slice(message).ok()?;
     recorder.remove("lost")
@@ -217,7 +230,9 @@ struct Records {
     path: PathBuf,
     file: BufReader<File>,
     reader: LinearReader,
-    channels: BTreeMap<u16, Arc<str>>,
+    schemas: BTreeMap<u16, Arc<str>>,
+    /// Topics and the names of their schemas.
+    channels: BTreeMap<u16, [Arc<str>; 2]>,
 }
 
 impl Records {
@@ -231,30 +246,32 @@ impl Records {
             path: path.to_path_buf(),
             file: BufReader::new(file),
             reader: LinearReader::new_with_options(options),
+            schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
         })
     }
 
-    fn topic(&self, header: &MessageHeader) -> Result<Arc<str>> {
+    fn topic(&self, header: &MessageHeader) -> Result<[Arc<str>; 2]> {
         self.channels.get(&header.channel_id).cloned().ok_or_else(|| RecordingError::Foreign {
             file: self.path.clone(),
             problem: format!("channel {} is not declared", header.channel_id),
         })
     }
 
-    /// Returns the next message of the topics in `wanted`; `None` at the end of the file or a cut.
-    fn message(&mut self, wanted: &[String]) -> Result<Option<Message>> {
+    /// Returns the next wanted message; `None` at the end of the file or a cut.
+    fn message(&mut self, wanted: impl Fn(&str, &str) -> bool) -> Result<Option<Message>> {
         loop {
             let (header, data) = match self.next() {
-                Ok(Some(Record::Message { header, data })) => (header, data.into_owned()),
+                Ok(Some(Record::Message { header, data })) => (header, data),
                 Ok(Some(_)) => continue,
                 Ok(None) | Err(Stop::Cut(_)) => return Ok(None),
                 Err(Stop::Error(error)) => return Err(error),
             };
-            let topic = self.topic(&header)?;
-            if wanted.is_empty() || wanted.iter().any(|name| **name == *topic) {
+            let [topic, kind] = self.topic(&header)?;
+            if wanted(&topic, &kind) {
                 let MessageHeader { log_time: log_ns, sequence, .. } = header;
-                return Ok(Some(Message { topic, log_ns, sequence, data }));
+                let data = data.into_owned();
+                return Ok(Some(Message { topic, kind, log_ns, sequence, data }));
             }
         }
     }
@@ -286,9 +303,13 @@ impl Records {
                             return Err(Stop::Error(RecordingError::Schema { file, schema }));
                         }
                         Record::Channel(channel) => {
-                            self.channels.insert(channel.id, channel.topic.into());
+                            let kind = self.schemas.get(&channel.schema_id).cloned();
+                            let topic = [channel.topic.into(), kind.unwrap_or_default()];
+                            self.channels.insert(channel.id, topic);
                         }
-                        Record::Schema { .. } => {}
+                        Record::Schema { header, .. } => {
+                            self.schemas.insert(header.id, header.name.into());
+                        }
                         record => return Ok(Some(record.into_owned())),
                     }
                 }

@@ -4,61 +4,37 @@
 //! writes corrected poses as laser poses, and continues the odometry from each of them with an
 //! `ODOM` of time 0. Odometry is then what the messages between them say.
 
-use std::{fs::File, io::BufRead as _, io::BufReader, io::Read as _, path::Path};
-
 use common::kinematics::Pose2;
 use glam::DVec2;
 
-use crate::{Instant, Log, LogError, between, moved};
+use crate::{Instant, Said, between, moved};
 
-/// Longest line: 16,384 beams of 12 characters, and as much again.
-const LONGEST_LINE: u64 = 400_000;
 const MOST_BEAMS: usize = 16_384;
-/// Most instants: a day at 50 Hz.
-const MOST_INSTANTS: usize = 4_320_000;
 /// Least time between instants, seconds.
 const LEAST_S: f64 = 1e-3;
 
 #[derive(Default)]
-struct Reading {
-    instants: Vec<Instant>,
+pub(crate) struct Reading {
+    pub(crate) instants: Vec<Instant>,
     /// Newest odometry pose of the file, and the one without corrections.
-    last: Option<Pose2>,
+    pub(crate) last: Option<Pose2>,
     odometry: Pose2,
-    is_corrected: bool,
-}
-
-/// Reads a log.
-///
-/// # Errors
-/// Returns an error if the file cannot be read, or if a line is no message of CARMEN.
-pub(crate) fn read(file: &Path) -> Result<Log, LogError> {
-    let unreadable = |cause| LogError::Unreadable { file: file.to_owned(), cause };
-    let mut lines = BufReader::new(File::open(file).map_err(unreadable)?);
-    let (mut reading, mut line) = (Reading::default(), Vec::new());
-    for number in 1.. {
-        line.clear();
-        let read = lines.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut line);
-        if read.map_err(unreadable)? == 0 {
-            break;
-        }
-        let taken = reading.take(&String::from_utf8_lossy(&line));
-        if taken.is_none() || reading.instants.len() > MOST_INSTANTS {
-            return Err(LogError::Line { file: file.to_owned(), number });
-        }
-    }
-    let Reading { instants, is_corrected, .. } = reading;
-    Ok(Log { instants, is_corrected })
+    pub(crate) is_corrected: bool,
 }
 
 impl Reading {
     /// Returns `None` for a line that is too long, or lacks numbers of its message.
-    fn take(&mut self, line: &str) -> Option<()> {
+    pub(crate) fn take(&mut self, line: &str) -> Option<()> {
         let mut words = line.split_ascii_whitespace();
         match words.next() {
             Some("ODOM") => {
                 let [x, y, heading, _, _, _, time_s] = numbers(&mut words)?;
-                self.odometry(pose([x, y, heading]), time_s);
+                if time_s == 0.0 && self.last.is_some() {
+                    self.last = Some(pose([x, y, heading]));
+                    self.is_corrected = true;
+                } else {
+                    self.odometry(pose([x, y, heading]), time_s);
+                }
             }
             Some("FLASER") => {
                 let beams = words.next()?.parse().ok().filter(|it| *it <= MOST_BEAMS)?;
@@ -71,32 +47,39 @@ impl Reading {
                 if self.last.is_none() {
                     self.odometry(pose([robot_x, robot_y, robot_heading]), time_s);
                 }
-                let instant = self.instants.last_mut()?;
-                if instant.scan.is_some() {
-                    let again = Instant { time_s: instant.time_s + LEAST_S, ..instant.clone() };
-                    self.instants.push(again);
-                }
-                let instant = self.instants.last_mut()?;
-                instant.scan = Some(beams);
-                instant.laser = pose([x, y, heading]);
+                self.scan(beams, pose([x, y, heading]))?;
             }
             _ => {}
         }
         Some(())
     }
 
-    fn odometry(&mut self, pose: Pose2, time_s: f64) {
-        let before = self.last.replace(pose);
-        if time_s == 0.0 && before.is_some() {
-            self.is_corrected = true;
-            return;
-        }
-        if let Some(before) = before {
+    pub(crate) fn odometry(&mut self, pose: Pose2, time_s: f64) {
+        if let Some(before) = self.last.replace(pose) {
             self.odometry = moved(self.odometry, between(before, pose));
         }
         let latest = self.instants.last().map_or(f64::MIN, |it| it.time_s + LEAST_S);
         let time_s = time_s.max(latest);
-        self.instants.push(Instant { time_s, odometry: self.odometry, ..Instant::default() });
+        self.instants.push(Instant {
+            time_s,
+            odometry: self.odometry,
+            laser: Pose2::default(),
+            has_scan: false,
+            said: Said::Line(None),
+        });
+    }
+
+    /// Takes a scan of the newest odometry's time. Returns `None` without odometry.
+    pub(crate) fn scan(&mut self, ranges: Vec<f32>, laser: Pose2) -> Option<()> {
+        let instant = self.instants.last_mut()?;
+        let scanned = Instant { laser, has_scan: true, said: Said::Line(Some(ranges)), ..*instant };
+        if instant.has_scan {
+            let time_s = instant.time_s + LEAST_S;
+            self.instants.push(Instant { time_s, ..scanned });
+        } else {
+            *instant = scanned;
+        }
+        Some(())
     }
 }
 
@@ -108,6 +91,6 @@ fn numbers<'a, const N: usize>(words: &mut impl Iterator<Item = &'a str>) -> Opt
     Some(numbers)
 }
 
-fn pose([x, y, heading]: [f64; 3]) -> Pose2 {
+pub(crate) fn pose([x, y, heading]: [f64; 3]) -> Pose2 {
     Pose2 { position: DVec2::new(x, y), heading }
 }

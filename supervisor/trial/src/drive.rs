@@ -3,7 +3,7 @@
 use common::{
     clock::{MissionTime, Pace},
     json_wire::{Report, line},
-    kinematics::Pose2,
+    kinematics::{Pose2, Twist},
     mission::{Mission, MissionError, Sensor},
     samples::{Action, Cause, CommandSample, CommandState, HoldReason, Order, PoseSample},
     stage::Answering as _,
@@ -14,16 +14,16 @@ use glam::DVec2;
 use link::step::{Effect, Entry, Event, Link, State};
 use mapper::step::{Input, Mapper, Scan, Tick};
 
-use crate::{Instant, Log, between, median, moved};
+use crate::{Instant, Log, Said, between, moved};
 
 /// Mission time of the log's first instant.
 const BEGINS_NS: u64 = 1_000_000_000;
+/// Longest log, seconds. A hostile one states any time.
+const LONGEST_S: f64 = 1e9;
 /// Interval of the link's turns without input.
 const LOOKS_NS: u64 = 20_000_000;
 /// Longest pause of a log in which the link takes its turns.
 const MOST_LOOKS: u64 = 500;
-/// Least and fastest rate of a robot's reports.
-const RATES_HZ: [f64; 2] = [1.0, 10.0];
 /// Space around the odometry, metres.
 const AROUND_M: f64 = 15.0;
 
@@ -36,12 +36,15 @@ const PAUSES: [Cause; 5] = [
     Cause::RobotDoesNotStop,
 ];
 
-/// Result of a driven log.
+/// Result of a driven log. Lists have one element for each scan that the mapper took.
 #[derive(Debug)]
 pub struct Drive {
-    /// Where the robot believes to be at each scan, once it is matched.
+    /// Where the robot believes to be, once the scan is matched.
     pub poses: Vec<PoseSample>,
-    /// True poses of the same times; none without corrected poses.
+    pub odometry: Vec<Pose2>,
+    /// Ranges counter-clockwise, metres.
+    pub scans: Vec<Vec<f32>>,
+    /// True poses; none without corrected poses.
     pub references: Option<Vec<Pose2>>,
     pub fixes: usize,
     /// Stands of the link's failsafe, except in pauses of the log: seconds since its start, and why.
@@ -51,47 +54,38 @@ pub struct Drive {
     pub mapper: Mapper,
 }
 
-/// Returns the mission of a robot that gives such a log, around the places of its odometry.
-///
-/// `robot` holds the tables of a robot of one's own.
+/// Returns the mission of a log's robot, around the places of its odometry.
 ///
 /// # Errors
-/// Returns an error if these tables are no valid mission.
-pub fn mission(log: &Log, robot: Option<&str>) -> Result<Mission, MissionError> {
+/// Returns an error if the robot's tables are no valid mission.
+pub fn mission(log: &Log) -> Result<Mission, MissionError> {
     let places = || log.instants.iter().map(|it| it.odometry.position);
     let [least, most] = [DVec2::min, DVec2::max].map(|of| places().fold(DVec2::ZERO, of));
     let (centre, size) = ((least + most) / 2.0, most - least);
     let width_m = size.max_element() + 2.0 * AROUND_M;
-    let periods = log.instants.windows(2).map(|it| it[1].time_s - it[0].time_s);
-    let period_s = median(periods).unwrap_or(1.0);
-    let rate_hz = period_s.recip().clamp(RATES_HZ[0], RATES_HZ[1]);
-    let beams = log.beams();
-    // A log may hold fewer reports than its robot gave, so they are late after the longest time.
-    let own = format!(
-        "[robot]\nprotocol = 'json'\nrate_hz = {rate_hz:.2}\ncommand_limit_s = 5\n\
-        [[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\n\
-        field_of_view_deg = 180\nreach_m = 30\nbeams = {beams}\n"
-    );
     let [x, y] = centre.to_array();
     let text = format!(
         "target = [0, 0]\nperimeter.width_m = {width_m:.1}\nperimeter.centre = [{x:.1}, {y:.1}]\n{}",
-        robot.unwrap_or(&own)
+        log.robot
     );
     Mission::parse(&text, "log.toml")
 }
 
-/// Returns the line that a robot sends at an instant.
-fn said(instant: &Instant, speeds: [f64; 2], heard: u64) -> Vec<u8> {
+/// Returns what the robot sends at an instant.
+fn said(instant: &Instant, speeds: [f64; 2], heard: u64) -> Vec<Vec<u8>> {
+    let scan = match &instant.said {
+        Said::Pieces(pieces) => return pieces.clone(),
+        Said::Line(scan) => scan.as_ref(),
+    };
     let Pose2 { position, heading } = instant.odometry;
-    let scan = instant.scan.as_ref();
     let ranges = |scan: &Vec<f32>| scan.iter().map(|range| Some(*range)).collect();
-    line(&Report {
+    vec![line(&Report {
         heard: Some(heard),
         odometry: Some([position.x, position.y, heading]),
         speeds: Some(speeds),
         scan: scan.map(ranges),
         ..Report::default()
-    })
+    })]
 }
 
 struct Driver<'a> {
@@ -104,7 +98,12 @@ struct Driver<'a> {
     tick: u64,
     now_ns: u64,
     stands: Vec<(f64, String)>,
-    pose: PoseSample,
+    /// Newest instant with a scan, the believed poses of those that the mapper took, and their
+    /// beams.
+    scanned: usize,
+    poses: Vec<(usize, PoseSample)>,
+    scans: Vec<Vec<f32>>,
+    fixes: usize,
 }
 
 /// Drives a log by a mission's robot.
@@ -122,33 +121,37 @@ pub fn drive(log: &Log, mission: &Mission) -> Option<Drive> {
         tick: 0,
         now_ns: BEGINS_NS,
         stands: Vec::new(),
-        pose: PoseSample::default(),
+        scanned: 0,
+        poses: Vec::new(),
+        scans: Vec::new(),
+        fixes: 0,
     };
     let first = log.instants.first()?;
-    let (mut poses, mut fixes) = (Vec::new(), 0);
+    let period_s = 0.5 * mission.robot.rate_hz.recip();
     for (index, instant) in log.instants.iter().enumerate() {
-        driver.wait_until(BEGINS_NS + ((instant.time_s - first.time_s) * 1e9) as u64);
-        driver.take(instant, log.instants.get(index + 1).unwrap_or(instant));
-        if instant.scan.is_some() {
-            let mut pose = driver.pose;
-            if let Some(fix) = driver.sources.fixes.last() {
-                fixes += 1;
-                (pose.x_m, pose.y_m, pose.heading_rad) = (fix.x_m, fix.y_m, fix.heading_rad);
-                pose.covariance = fix.covariance;
-            }
-            poses.push(pose);
+        let since_s = (instant.time_s - first.time_s).min(LONGEST_S);
+        driver.wait_until(BEGINS_NS + (since_s * 1e9) as u64);
+        if instant.has_scan {
+            driver.scanned = index;
         }
+        let is_later = |it: &&Instant| it.time_s - instant.time_s >= period_s;
+        let next = log.instants.get(index + 1).unwrap_or(instant);
+        let later = log.instants[index..].iter().find(is_later).unwrap_or(instant);
+        driver.take(instant, next, later);
     }
-    let start = log.scanned().next()?.laser;
+    let start = first.laser;
     let arm = Pose2 {
         position: laser.mount.forward_m * DVec2::from_angle(laser.mount.bearing_rad),
         heading: 0.0,
     };
     let back = between(arm, Pose2::default());
     let body = |pose: Pose2| moved(arm, moved(between(start, pose), back));
-    let references = log.is_corrected.then(|| log.scanned().map(|it| body(it.laser)).collect());
-    let Driver { mapper, stands, .. } = driver;
-    Some(Drive { poses, references, fixes, stands, laser, mapper })
+    let Driver { mapper, stands, poses, scans, fixes, .. } = driver;
+    let (indices, poses): (Vec<_>, Vec<_>) = poses.into_iter().unzip();
+    let instants = || indices.iter().map(|index| &log.instants[*index]);
+    let odometry = instants().map(|it| it.odometry).collect();
+    let references = log.is_corrected.then(|| instants().map(|it| body(it.laser)).collect());
+    Some(Drive { poses, odometry, scans, references, fixes, stands, laser, mapper })
 }
 
 impl Driver<'_> {
@@ -161,22 +164,29 @@ impl Driver<'_> {
         self.now_ns = until_ns;
     }
 
-    fn take(&mut self, instant: &Instant, next: &Instant) {
+    /// Takes an instant, whose robot reports its speeds until `next` and was told those until
+    /// `later`.
+    fn take(&mut self, instant: &Instant, next: &Instant, later: &Instant) {
         let body = self.mission.body();
-        let Pose2 { position, heading } = between(instant.odometry, next.odometry);
-        let way_m = position.length().copysign(position.x);
-        let seconds = (next.time_s - instant.time_s).max(LOOKS_NS as f64 * 1e-9);
-        let speeds = [-1.0, 1.0].map(|side| {
-            (way_m + side * heading * body.track_m / 2.0) / seconds / body.wheel_radius_m
-        });
-        debug_assert!(speeds.iter().all(|it| it.is_finite()));
+        let twist = |to: &Instant| {
+            let Pose2 { position, heading } = between(instant.odometry, to.odometry);
+            let seconds = (to.time_s - instant.time_s).max(LOOKS_NS as f64 * 1e-9);
+            let v = position.length().copysign(position.x) / seconds;
+            debug_assert!(v.is_finite());
+            Twist { v, omega: heading / seconds }
+        };
         self.order();
-        self.give(Event::Datagram(&said(instant, speeds, self.heard)));
+        let speeds = body.unlimited().wheels(twist(next));
+        for piece in said(instant, speeds, self.heard) {
+            self.give(Event::Datagram(&piece));
+        }
+        let told = twist(later);
+        let [left_rad_s, right_rad_s] = body.unlimited().wheels(told);
         let mut command = CommandSample {
-            left_rad_s: speeds[0],
-            right_rad_s: speeds[1],
-            v_m_s: way_m / seconds,
-            omega_rad_s: heading / seconds,
+            left_rad_s,
+            right_rad_s,
+            v_m_s: told.v,
+            omega_rad_s: told.omega,
             pose_ns: self.now_ns,
             guidance_ns: self.now_ns,
             state: CommandState::Driving.into(),
@@ -210,7 +220,7 @@ impl Driver<'_> {
                     self.sources.counts.iter_mut().for_each(|it| it.stamp = wheels.stamp);
                     let mut pose = self.reckoning.answer(&wheels, &self.sources, now).sample;
                     pose.stamp = wheels.stamp;
-                    self.pose = pose;
+                    let beams = scans.first().map(|it| it.beams.clone());
                     let scan = |it: common::driver::LaserScan| Scan {
                         row: it.row,
                         beams: it.beams,
@@ -221,6 +231,16 @@ impl Driver<'_> {
                     let tick = Tick { pose, ranges, scans, contact, ..Tick::default() };
                     self.mapper.step(Input::Tick(tick), now);
                     self.sources.fixes = self.mapper.take_fix().into_iter().collect();
+                    if let Some(fix) = self.sources.fixes.last() {
+                        self.fixes += 1;
+                        (pose.x_m, pose.y_m, pose.heading_rad) =
+                            (fix.x_m, fix.y_m, fix.heading_rad);
+                        pose.covariance = fix.covariance;
+                    }
+                    if let Some(beams) = beams {
+                        self.poses.push((self.scanned, pose));
+                        self.scans.push(beams);
+                    }
                 }
                 Effect::Decided { before, now: decision } => {
                     let stands =

@@ -6,7 +6,7 @@ use common::kinematics::Pose2;
 use glam::DVec2;
 use serde::Serialize;
 
-use crate::{Log, between, drive::Drive, median};
+use crate::{between, drive::Drive, median};
 
 /// Side of a cell of the blur, metres.
 const CELL_M: f64 = 0.1;
@@ -33,9 +33,7 @@ pub struct Judged {
     pub false_stands: usize,
 }
 
-/// Judges the poses of a drive.
-pub fn judge(log: &Log, drive: &Drive) -> Judged {
-    let odometry: Vec<_> = log.scanned().map(|it| it.odometry).collect();
+pub fn judge(drive: &Drive) -> Judged {
     let poses: Vec<_> = drive.poses.iter().map(|it| it.pose()).collect();
     let references = drive.references.as_deref();
     let error = |poses: &[Pose2], way_m| error_over(references?, poses, way_m);
@@ -48,16 +46,16 @@ pub fn judge(log: &Log, drive: &Drive) -> Judged {
         });
         beyond.count() as f64 / references.len().max(1) as f64
     });
-    let cells = |poses: &[Pose2]| cells(log, drive, poses) as f64;
+    let cells = |poses: &[Pose2]| cells(drive, poses) as f64;
     Judged {
         scans: poses.len(),
         fixes: drive.fixes as f64 / poses.len().max(1) as f64,
         error_5_m: error(&poses, 5.0),
         error_20_m: error(&poses, 20.0),
-        odometry_error_5_m: error(&odometry, 5.0),
-        odometry_error_20_m: error(&odometry, 20.0),
+        odometry_error_5_m: error(&drive.odometry, 5.0),
+        odometry_error_20_m: error(&drive.odometry, 20.0),
         beyond_2_sigma: beyond,
-        blur_ratio: cells(&poses) / cells(&odometry).max(1.0),
+        blur_ratio: cells(&poses) / cells(&drive.odometry).max(1.0),
         false_stands: drive.stands.len(),
     }
 }
@@ -81,10 +79,10 @@ fn error_over(references: &[Pose2], poses: &[Pose2], way_m: f64) -> Option<f64> 
 }
 
 /// Counts the cells that the points of all scans touch.
-fn cells(log: &Log, drive: &Drive, poses: &[Pose2]) -> usize {
+fn cells(drive: &Drive, poses: &[Pose2]) -> usize {
     let (first_rad, step_rad) = drive.laser.fan();
     let mut touched = BTreeSet::new();
-    for (scan, pose) in log.scanned().filter_map(|it| it.scan.as_ref()).zip(poses) {
+    for (scan, pose) in drive.scans.iter().zip(poses) {
         let laser = drive.laser.mount.on(*pose);
         for (beam, range) in scan.iter().enumerate() {
             let range = f64::from(*range);

@@ -6,6 +6,7 @@
 //! goals of a previous process.
 
 pub mod cdr;
+pub mod frames;
 pub mod messages;
 pub mod msg;
 #[cfg(feature = "dds")]

@@ -12,11 +12,11 @@ use console::{
 
 /// Try a robot's log: track it as a robot that somebody else drives, and judge the result.
 ///
-/// Reads logs in CARMEN's format with a laser of 180 degrees. A log with corrected poses, such as
-/// GMapping writes, judges them too.
+/// Reads bags of ROS 2, in MCAP or SQLite, and logs in CARMEN's format with a laser of 180 degrees,
+/// also compressed by gzip. A log with corrected poses, such as GMapping writes, judges them too.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Log with odometry and laser scans.
+    /// Log with odometry and laser scans: a file, or the directory of a bag.
     #[arg(value_name = "LOG")]
     log: PathBuf,
     /// Tables `[robot]` and `[[robot.sensor]]` of its robot; by default of a robot with this laser.
@@ -35,16 +35,16 @@ const COLUMNS: [&str; 7] =
     ["time_s", "x_m", "y_m", "heading_rad", "x_sd_m", "y_sd_m", "heading_sd_rad"];
 
 pub fn main(arguments: &Arguments) -> Result {
-    let log = Log::read(&arguments.log)?;
     let robot = arguments.robot.as_ref().map(fs::read_to_string).transpose()?;
-    let mission = trial::mission(&log, robot.as_deref())?;
+    let log = Log::read(&arguments.log, robot.as_deref())?;
+    let mission = trial::mission(&log)?;
     let drive = trial::drive(&log, &mission).ok_or_else(|| {
         Refused::new(
             "no-laser",
             "the robot has no laser; give --robot with a [[robot.sensor]] of kind \"scan\"",
         )
     })?;
-    let judged = trial::judge(&log, &drive);
+    let judged = trial::judge(&drive);
     let (frame, cells) = (drive.mapper.frame(), &drive.mapper.state().cells);
     if let Some(out) = &arguments.out {
         fs::create_dir_all(out)?;

@@ -21,6 +21,7 @@ use recording::now_ns;
 use robot_state::{Feed, Sample, TOPICS, newest_run};
 use ros2::{
     cdr::Cdr as _,
+    frames::Frames as Transforms,
     msg::Bool,
     participant::{Message, Request},
 };
@@ -31,7 +32,6 @@ use crate::{
     action::{Refusal, Server},
     asked,
     endpoints::{self, is_of_robot, published},
-    frames::Frames as Transforms,
     goals::{Status, Uuid, reply_to_goal},
     node::{Call, Network, Node},
     orders::{Done, Order, Orders, Why},

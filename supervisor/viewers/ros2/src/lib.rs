@@ -10,7 +10,6 @@ mod bag;
 mod bridge;
 mod drift;
 mod endpoints;
-mod frames;
 mod goals;
 mod messages;
 mod node;

@@ -31,6 +31,7 @@ use harmonic::{Cancellation, Cell};
 use recording::now_ns;
 use ros2::{
     cdr::Cdr as _,
+    frames::{Frames, placed},
     msg::{
         Clock, ComputePathThroughPosesResult, ComputePathToPoseResult, Header, PoseStamped, Release,
     },
@@ -44,7 +45,6 @@ use self::{
 };
 use crate::{
     bridge::BridgeError,
-    frames::{Frames, placed},
     goals::{Goals, Status, Uuid, reply_to_goal},
     messages,
     node::{Call, LATCHED, NEWEST, Network, Node, SURE},

@@ -10,6 +10,7 @@ use glam::{DAffine2, DVec2};
 use harmonic::Cancellation;
 use ros2::{
     cdr::Cdr as _,
+    frames::Frames,
     msg::{Header, OccupancyGrid, OccupancyGridUpdate, Release},
     parts::Pose,
 };
@@ -21,7 +22,6 @@ use super::{
     inscribed,
     planning::{Failure, Planner, Reason},
 };
-use crate::frames::Frames;
 
 const BODY: Body = Body { radius_m: 0.22, occupied: 99, enters_unknown: true };
 

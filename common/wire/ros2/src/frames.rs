@@ -1,12 +1,12 @@
-//! Frames of `/tf` and `/tf_static`, in the plane. Pure.
+//! Frames of `/tf` and `/tf_static`, in the plane. A frame that is upside down is mirrored.
 
 use std::{collections::BTreeMap, time::Instant};
 
-use glam::DAffine2;
-use ros2::{
+use crate::{
     cdr::Cdr as _,
-    msg::{TFMessage, TransformStamped},
+    msg::{Quaternion, TFMessage, TransformStamped},
 };
+use glam::{DAffine2, dvec2};
 
 const MOST_FRAMES: usize = 1024;
 
@@ -18,7 +18,7 @@ struct Place {
     heard: Option<Instant>,
 }
 
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub struct Frames(BTreeMap<String, Place>);
 
 impl Frames {
@@ -28,7 +28,10 @@ impl Frames {
             TFMessage::decode(payload)?.transforms
         {
             let at = [transform.translation.x, transform.translation.y];
-            let pose = placed(at, transform.rotation.heading().unwrap_or(f64::NAN));
+            let Quaternion { x, y, .. } = transform.rotation;
+            let up = (1.0 - 2.0 * (x * x + y * y)).signum();
+            let pose = placed(at, transform.rotation.heading().unwrap_or(f64::NAN))
+                * DAffine2::from_scale(dvec2(1.0, up));
             let [parent, frame] = [&header.frame_id, &child_frame_id].map(|frame| name(frame));
             let is_known = self.0.contains_key(frame);
             if pose.is_finite() && (is_known || self.0.len() < MOST_FRAMES) {
