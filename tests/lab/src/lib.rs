@@ -18,7 +18,6 @@ mod missions;
 mod robot;
 mod ros2_robot;
 mod simulate;
-mod sources;
 mod tick;
 mod worlds;
 
@@ -62,7 +61,6 @@ enum Bench {
     BringUp(bring_up::Arguments),
     Consumer(chaos::consumers::Arguments),
     Ros2Robot(ros2_robot::Arguments),
-    Sources(sources::Arguments),
 }
 
 fn rows<T: DeserializeOwned>(table: impl Read) -> csv::Result<Vec<T>> {
@@ -98,7 +96,6 @@ fn execute(arguments: &Arguments) -> error::Result<ExitCode> {
             Bench::BringUp(arguments) => bring_up::main(arguments),
             Bench::Consumer(arguments) => chaos::consumers::main(arguments),
             Bench::Ros2Robot(arguments) => ros2_robot::main(arguments),
-            Bench::Sources(arguments) => sources::main(arguments),
         },
     };
     Ok(done?.report())
