@@ -15,9 +15,6 @@
 //! The same inputs therefore give the same outputs to the bit, on any machine. Everything else
 //! becomes an entry: clock readings (of the link), results of other threads (the planner's
 //! background solve), a random seed (the mission's).
-//!
-//! # Adding a stage
-//! The guide's page `add-a-stage.md` adds one, an odometer.
 
 use std::{borrow::Cow, fmt::Debug};
 

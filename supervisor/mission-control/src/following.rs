@@ -77,8 +77,6 @@ impl Following {
         self.heard.map_or(DVec2::ZERO, |(_, place)| place)
     }
 
-    /// # Errors
-    /// Returns why the sample is not used.
     pub(crate) fn take(
         &mut self,
         beacon: &BeaconSample,

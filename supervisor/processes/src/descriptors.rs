@@ -9,9 +9,6 @@ use crate::domain_error::DomainError;
 pub(crate) const NEEDED: u64 = 512;
 
 /// Raises the soft limit of descriptors to the hard limit.
-///
-/// # Errors
-/// Returns a limit that is too low, which the middleware would report vaguely.
 pub(crate) fn raise_limit() -> Result<(), DomainError> {
     let Some([_, hard]) = limits() else {
         return Ok(());

@@ -224,7 +224,6 @@ struct Healthy {
     residuals: Vec<Residual>,
     /// 0 for a robot that was touched.
     hours: f64,
-    /// Greatest evidence of each doubt.
     greatest: BTreeMap<&'static str, f64>,
     /// Causes that say that the robot is faulty, and its greatest doubt.
     causes: Vec<(Cause, &'static str)>,

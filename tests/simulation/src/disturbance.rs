@@ -137,7 +137,6 @@ pub fn inject(bus: &Bus, stage: &str, kind: FaultKind) -> Result<(), BusError> {
     bus.writer(&topics::FAULTS, 1)?.publish(0, MissionTime::default(), sample)
 }
 
-/// Says where the beacon is at the time of the newest pose.
 pub fn say_beacon(bus: &Bus, [x_m, y_m]: [f64; 2]) -> Result<(), BusError> {
     let pose = bus.reader(&topics::POSE)?.newest()?.unwrap_or_default();
     let (capture_ns, source, deviation_m) = (pose.stamp.stamp_ns, name("walker"), 0.02);

@@ -34,7 +34,6 @@ const RESTS_WITHIN: Duration = Duration::from_secs(3);
 /// Pose error beyond four standard deviations, metres.
 const POSE_SLACK_M: f64 = 0.3;
 
-/// A broken invariant.
 #[derive(Clone, Debug, Error)]
 #[error("invariant '{invariant}' broken at event {event}, {:.6} s: {detail}", at.as_secs_f64())]
 pub struct Broken {

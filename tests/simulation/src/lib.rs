@@ -72,7 +72,6 @@ pub struct Scenario {
 }
 
 impl Scenario {
-    /// Returns the name of the simulated robot.
     pub fn robot() -> RobotName {
         RobotName::default()
     }

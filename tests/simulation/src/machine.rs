@@ -132,7 +132,6 @@ impl SimulatedMachine {
         self.robot.replace(Some(robot));
     }
 
-    /// Returns the newest ground truth.
     pub fn truth(&self) -> Option<GroundTruthTick> {
         self.robot.borrow().as_ref()?.truth.last().copied()
     }
@@ -223,7 +222,6 @@ impl SimulatedMachine {
         FIRST_PROCESS + self.processes_started.get()
     }
 
-    /// Starts a stage's process.
     pub fn start(&self, generation: &Generation, run: Run) -> u32 {
         let process = self.new_process();
         if generation.stage == LINK {
@@ -486,7 +484,6 @@ impl SimulatedMachine {
         }
     }
 
-    /// Returns the live process of a stage.
     pub fn process_of(&self, stage: &str) -> Option<u32> {
         let processes = self.processes.borrow();
         let mut live = processes.iter().filter(|(_, it)| it.stage == stage && it.is_live());

@@ -9,7 +9,6 @@ use processes::{
 };
 use rustix::process::Signal;
 
-/// A stage's process.
 #[derive(Default)]
 pub struct Process {
     pub stage: &'static str,

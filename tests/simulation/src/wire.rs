@@ -123,7 +123,6 @@ impl Wires {
     }
 }
 
-/// A host's end of a wire.
 #[derive(Debug)]
 pub struct HostEnd {
     wires: Rc<RefCell<Wires>>,

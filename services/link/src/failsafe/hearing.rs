@@ -78,7 +78,6 @@ impl Missing {
 
 #[derive(Clone, Debug)]
 pub(super) struct Hearing {
-    /// Used sensors by row.
     sensors: BTreeMap<u8, Sensor>,
     /// Rows of the front sonar and of the rangers to its left and right that look into its cone.
     front: Option<[u8; 3]>,

@@ -1,6 +1,5 @@
 //! The page shows the code of this crate.
 
-/// The block of the page that follows `caption`.
 fn block(caption: &str) -> &'static str {
     let page = include_str!("../../add-a-stage.md");
     let after = page.split_once(caption).map(|(_, after)| after);

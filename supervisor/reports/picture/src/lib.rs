@@ -1,20 +1,8 @@
 //! Pictures of runs and of fields on maps, as self-contained SVG files.
 //!
-//! Layers from bottom to top, in the mission frame (metres, y up):
-//!
-//! | module | draws |
-//! |---|---|
-//! | `bands` | log2 u of the final belief |
-//! | `streamlines` | lines of E |
-//! | `cells` | hazard cells of the map |
-//! | `world` | real obstacles |
-//! | `motion` | trajectories, bodies, start, target |
-//! | `movers` | tracks of moving things |
-//! | `margin`, `legend` | title, axes, captions; symbols |
-//! | `page`, `lattice` | the page, and cells on it |
-//! | [`Scene`] | data of a picture |
-//!
-//! `map` draws the field of a bare map, `points` the points that a robot saw.
+//! Layers from bottom to top, in the mission frame (metres, y up): `bands` of log2 u of the final
+//! belief, `streamlines` of E, hazard `cells`, the real `world`, `motion`, `movers`, then `margin`
+//! and `legend`. `map` draws the field of a bare map, `points` the points that a robot saw.
 //!
 //! Only the frame layer is mandatory, and every input gives a valid file.
 

@@ -241,9 +241,6 @@ impl Estimate {
     }
 
     /// Checks the residuals.
-    ///
-    /// # Errors
-    /// Fails if they exceed what the noise explains.
     pub(crate) fn unless_scattered(self) -> Result<Self, Refusal> {
         if self.chi2_per_dof > MOST_CHI2 {
             Err(Refusal::Scattered { chi2_per_dof: self.chi2_per_dof })
@@ -283,8 +280,6 @@ impl Estimate {
         (square / off.len() as f64).sqrt()
     }
 
-    /// # Errors
-    /// Fails if they lie far from the prediction.
     pub(crate) fn agrees_with(&self, held_out: &Rows) -> Result<(), Refusal> {
         let deviations = self.deviations(held_out);
         // NaN counts as a contradiction.

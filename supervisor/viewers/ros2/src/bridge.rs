@@ -152,9 +152,6 @@ pub fn serve(
 
 impl Bridge<'_> {
     /// Begins a run. Its file may appear after the first samples.
-    ///
-    /// # Errors
-    /// The run's link reads a topic that would be published.
     fn begin(&mut self, domain: &Domain) -> Result<(), BridgeError> {
         if self.shown.is_some() {
             return Ok(());

@@ -11,7 +11,6 @@ use ros2::{
     parts::Pose,
 };
 
-/// Takes parent, child and pose.
 pub fn transforms(ns: u64, transforms: &[(&str, &str, Pose)]) -> Vec<u8> {
     let transform = |&(parent, child, pose): &(&str, &str, Pose)| TransformStamped {
         header: Header::at(ns, parent),

@@ -50,7 +50,6 @@ pub fn claims() -> csv::Result<Vec<Claim>> {
     crate::rows(include_str!("claims.csv").as_bytes())
 }
 
-/// Returns the named experiments, or all without names.
 pub fn named(names: &[String]) -> Result<Vec<Experiment>> {
     let mut table: Vec<Experiment> = crate::rows(include_str!("table.csv").as_bytes())?;
     if let Some(name) = names.iter().find(|name| !table.iter().any(|it| it.name == **name)) {

@@ -26,7 +26,6 @@ impl<'a> Page<'a> {
         Self { text, results }
     }
 
-    /// Adds an element with the lines of `text`.
     pub fn element(&mut self, tag: &str, text: &str) {
         let lines: Vec<_> = text.lines().map(escaped).collect();
         self.text += &format!("<{tag}>{}</{tag}>\n", lines.join("\n"));

@@ -154,7 +154,6 @@ impl Row {
     }
 }
 
-/// Returns the spread of a column over the successes.
 pub fn spread(rows: &[&Row], column: &str) -> Option<Spread> {
     let successes = rows.iter().filter(|row| row.is_success());
     Spread::of(successes.filter_map(|row| row.number(column)))

@@ -75,11 +75,6 @@ pub(crate) struct Tree {
 
 impl Tree {
     /// Builds the tree over all cells of `pass` except the target.
-    ///
-    /// # Errors
-    /// - [`SolveError::Cancelled`].
-    /// - [`SolveError::TooCostly`] as soon as the factorisation needs more memory or operations
-    ///   than `job` allows.
     pub(crate) fn of(pass: &BreadthFirst, job: Job<'_>) -> Result<Self, SolveError> {
         let shape = Shape::of(pass);
         job.ask(Builder::bytes(pass))?;

@@ -91,9 +91,6 @@ impl Planner {
     }
 
     /// Thins a path to one answer. Keeps `ends`, and chords clear of blocked cells.
-    ///
-    /// # Errors
-    /// An answer holds too few poses.
     fn thinned(&self, map: &Costmap, path: &[Pose], ends: &[usize]) -> Result<Vec<Pose>, Failure> {
         let most = MOST_BYTES / (POSE_BYTES + map.frame.len());
         let mut stride = path.len().div_ceil(most);
